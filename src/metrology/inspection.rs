@@ -206,9 +206,11 @@ impl Inspection<'_> {
         if top <= high { top } else { f64::INFINITY }
     }
 
-    /// Area of the design surface that a cell stands for, mm².
-    fn area(&self, sample: &Sample) -> f64 {
-        self.grid.cell * self.grid.cell / f64::from(sample.lean).max(LEAST_FACING)
+    /// Area of the design surface that cell `k` stands for, mm²: no more than lies in the part's rectangle of the plan.
+    fn area(&self, k: usize, sample: &Sample) -> f64 {
+        let (centre, bounds) = (self.centre(k), self.part.bounds());
+        let breadth = |i: usize| self.grid.breadth(centre[i], [bounds.min[i], bounds.max[i]]).max(0.0);
+        breadth(0) * breadth(1) / f64::from(sample.lean).max(LEAST_FACING)
     }
 
     /// The design surface at a place of the plan, where an upright cutter faces it.
@@ -224,7 +226,7 @@ impl Inspection<'_> {
     /// Figures of the deviations at the centres. Where passes are about as near to each other as the cells are, centres lie on
     /// ridges, or between them, by chance: there the mean is that of places spread over the cells.
     pub fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
-        let figures = DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(&samples[k]))));
+        let figures = DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(k, &samples[k]))));
         let row = |j: usize| (0..self.grid.nx).map(move |i| self.grid.index(i, j));
         let on = |k: &usize| !samples[*k].deviation.is_nan();
         let crowded = work::parallel::map(self.grid.ny, |j| {
@@ -234,7 +236,7 @@ impl Inspection<'_> {
             return figures;
         }
         let spread = work::parallel::map(self.grid.ny, |j| {
-            let of_one = |k: usize| Some((self.beside_centre(k)?, self.area(&samples[k])));
+            let of_one = |k: usize| Some((self.beside_centre(k)?, self.area(k, &samples[k])));
             row(j).filter(on).filter_map(of_one).collect::<Vec<_>>()
         });
         DeviationFigures { rms_mm: DeviationFigures::of(spread.into_iter().flatten()).rms_mm, ..figures }
@@ -283,7 +285,7 @@ impl Inspection<'_> {
         let mut figures = GougeFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let regions = connected(&self.grid, &deep);
         for region in &regions {
-            let area: f64 = region.iter().map(|&k| self.area(&samples[k as usize])).sum();
+            let area: f64 = region.iter().map(|&k| self.area(k as usize, &samples[k as usize])).sum();
             figures.area_mm2 += area;
             let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { continue };
             let (depth, at, by) = self.deepest_near(deepest as usize);
@@ -448,8 +450,9 @@ impl Inspection<'_> {
             let mut volume = 0.0;
             for &k in &region {
                 let sample = &samples[k as usize];
-                area += self.area(sample);
-                volume += self.area(sample) * height(k as usize);
+                let of_cell = self.area(k as usize, sample);
+                area += of_cell;
+                volume += of_cell * height(k as usize);
             }
             cells.push(region);
             let centre = self.centre(highest as usize);

@@ -8,11 +8,14 @@ use serde::Serialize;
 
 use geometry::Vector3;
 use motion::{MoveKind, Toolpath};
-use sim::{MoveRemoval, RapidContact, Removal, VoxelRemoval};
+use sim::{ENGAGED, MoveRemoval, RapidContact, Removal, VoxelRemoval};
 
 /// Rates are means over consecutive feed moves of at least so many cells of travel. Fewer let the
 /// cells show that a steep cutter clears at a time; more smooth true peaks away.
 const STRETCH_CELLS: f64 = 4.0;
+
+/// Moves longer than so many stretches are held against the greatest section of what they cut: the mean over them may hide a peak.
+const LONG: f64 = 4.0;
 
 /// Rapid moves that are listed, the first ones of the program.
 const LISTED_CONTACTS: usize = 100;
@@ -47,10 +50,14 @@ pub struct RemovalFigures {
     pub mean_material_removal_rate_mm3_min: f64,
     /// 95 % of the time in material the rate is lower.
     pub p95_material_removal_rate_mm3_min: f64,
-    /// Greatest rate over a few cells of travel.
+    /// Greatest rate over a few cells of travel; of a long move over what it cuts.
     pub max_material_removal_rate_mm3_min: f64,
     /// Bound of its error.
     pub max_material_removal_rate_error_bound_mm3_min: f64,
+    /// As far as cells see, the rate is nowhere greater, also in a part of a long move: held against the greatest width times the
+    /// greatest depth of what the move cuts, which may be much more than its section. Not by voxels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material_removal_rate_at_most_mm3_min: Option<f64>,
     /// The move that ends the stretch with the greatest rate, counted from 0.
     pub max_material_removal_rate_move: u32,
     /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels. By
@@ -80,6 +87,14 @@ struct Stretch {
     volume: f64,
     bound: f64,
     last: u32,
+    /// The rate exceeds this nowhere on its long moves.
+    peak: f64,
+}
+
+impl Stretch {
+    fn rate(&self) -> f64 {
+        self.volume / self.minutes
+    }
 }
 
 /// What an engine found, by cells or voxels of a pitch, mm.
@@ -89,6 +104,27 @@ struct RemovalRecord<'a> {
     volume_bound: f64,
     pitch: f64,
     axial: AxialBound,
+}
+
+impl RemovalRecord<'_> {
+    /// How much of a move cuts, mm: as far as what it cut reaches along it, and never less than a stretch; of a plunge what it is deep.
+    fn in_material(&self, removed: &MoveRemoval, way: Vector3, least: f64) -> f64 {
+        let (length, in_plan) = (way.norm(), way.xy().norm());
+        let reaches = match self.axial {
+            AxialBound::Of(_) => length,
+            AxialBound::Top(_) if in_plan > 1e-9 * length => (removed.along * length / in_plan).max(least),
+            AxialBound::Top(_) => removed.depth,
+        };
+        if removed.depth > ENGAGED { reaches.min(length) } else { length }
+    }
+
+    /// By cells: no more is cut for a mm of the way, mm². Ahead it is a section, and below a cutter that goes down what it stands on.
+    fn greatest_section(&self, removed: &MoveRemoval, way: Vector3) -> f64 {
+        let wide = removed.radial + removed.radial_bound;
+        let down = (-way.z / way.norm()).max(0.0);
+        let stands_on = wide * if removed.along > 0.0 { removed.along } else { wide };
+        wide * removed.depth + stands_on * down
+    }
 }
 
 /// What bounds the greatest axial engagement.
@@ -171,50 +207,71 @@ fn below(path: &Toolpath, top: f64, found: f64) -> f64 {
 }
 
 fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_>) {
-    let least = STRETCH_CELLS * found.pitch;
+    // A hair less, so that moves of just the length do not go in pairs.
+    let least = STRETCH_CELLS * found.pitch * (1.0 - 1e-9);
     let (mut volume, mut minutes) = (0.0, 0.0);
     let mut stretches: Vec<Stretch> = Vec::new();
+    // Whether the last of the stretches ends where the open one begins.
+    let mut goes_on = false;
     let mut stretch = Stretch::default();
     for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(found.moves) {
         if m.kind == MoveKind::Rapid || m.feed_rate.is_nan() || m.feed_rate <= 0.0 {
-            stretch = Stretch::default();
+            rest(&mut stretches, std::mem::take(&mut stretch), goes_on);
+            goes_on = false;
             continue;
         }
         let length = (to - from).norm();
-        let time = length / m.feed_rate;
         if removed.volume > 0.0 {
             volume += removed.volume;
-            minutes += time;
+            minutes += length / m.feed_rate;
         }
         stretch.length += length;
-        stretch.minutes += time;
+        stretch.minutes += found.in_material(removed, to - from, least) / m.feed_rate;
         stretch.volume += removed.volume;
         stretch.bound += removed.volume_bound;
         stretch.last = k as u32;
-        // A hair less, so that moves of just the length do not go in pairs.
-        if stretch.length >= least * (1.0 - 1e-9) {
-            if stretch.volume > 0.0 {
-                stretches.push(stretch);
-            }
-            stretch = Stretch::default();
+        if length > LONG * least {
+            stretch.peak = stretch.peak.max(found.greatest_section(removed, to - from) * m.feed_rate);
+        }
+        if stretch.length >= least {
+            goes_on = stretch.volume > 0.0;
+            stretches.extend(Some(std::mem::take(&mut stretch)).filter(|s| s.volume > 0.0));
         }
     }
+    rest(&mut stretches, stretch, goes_on);
     if minutes > 0.0 {
         figures.mean_material_removal_rate_mm3_min = volume / minutes;
     }
-    let rate = |s: &Stretch| s.volume / s.minutes;
-    stretches.sort_by(|a, b| rate(a).total_cmp(&rate(b)));
+    let upper = stretches.iter().map(|s| s.peak.max((s.volume + s.bound) / s.minutes)).fold(0.0, f64::max);
+    stretches.sort_by(|a, b| a.rate().total_cmp(&b.rate()));
     let Some(greatest) = stretches.last() else { return };
-    figures.max_material_removal_rate_mm3_min = rate(greatest);
+    figures.max_material_removal_rate_mm3_min = greatest.rate();
     figures.max_material_removal_rate_error_bound_mm3_min = greatest.bound / greatest.minutes;
+    figures.material_removal_rate_at_most_mm3_min =
+        matches!(found.axial, AxialBound::Top(_)).then_some(upper);
     figures.max_material_removal_rate_move = greatest.last;
     let in_material: f64 = stretches.iter().map(|s| s.minutes).sum();
     let mut below = 0.0;
     for s in &stretches {
         below += s.minutes;
         if below >= 0.95 * in_material {
-            figures.p95_material_removal_rate_mm3_min = rate(s);
+            figures.p95_material_removal_rate_mm3_min = s.rate();
             break;
+        }
+    }
+}
+
+/// What is left before a rapid move or the end belongs to the stretch that it goes on from, or is one of its own.
+fn rest(stretches: &mut Vec<Stretch>, rest: Stretch, goes_on: bool) {
+    match stretches.last_mut().filter(|_| goes_on) {
+        _ if rest.volume <= 0.0 => {}
+        None => stretches.push(rest),
+        Some(last) => {
+            last.length += rest.length;
+            last.minutes += rest.minutes;
+            last.volume += rest.volume;
+            last.bound += rest.bound;
+            last.last = rest.last;
         }
     }
 }
@@ -223,7 +280,7 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_
 mod tests {
     use super::*;
     use cutter::Cutter;
-    use geometry::{Point2, Point3};
+    use geometry::{Aabb, Point2, Point3};
     use motion::{ClPoint, Move};
     use sim::{Grid, ZMap, cut_in_order};
     use work::monitor::Silent;
@@ -267,6 +324,56 @@ mod tests {
         let off = (figures.max_radial_engagement_mm - 6.0).abs();
         assert!(off <= figures.max_radial_engagement_error_bound_mm, "{figures:?}");
         assert_eq!((figures.rapid_contact_count, figures.engine_difference_mm), (0, Some(0.0)));
+    }
+
+    /// Told from long moves that begin in the air, and from short ones before a rapid move.
+    #[test]
+    fn no_move_is_too_long_or_too_short_for_a_rate() {
+        let cutter = Cutter::flat(6.0).unwrap();
+        let greatest = |start: [f64; 3], moves: Vec<Move>| {
+            let path = Toolpath::new(ClPoint::upright(Point3::from(start)), moves);
+            let figures = cut_from_block(&cutter, &path);
+            [
+                figures.max_material_removal_rate_mm3_min,
+                figures.max_material_removal_rate_error_bound_mm3_min,
+                figures.material_removal_rate_at_most_mm3_min.unwrap(),
+            ]
+        };
+        // A slot of 6 by 2 mm with a round end, half of whose move is in the air.
+        let [rate, bound, most] = greatest([-24.0, 10.0, -2.0], vec![to(20.0, 10.0, -2.0, MoveKind::Cut)]);
+        let mean = 2.0 * (20.0 * 6.0 + 4.5 * std::f64::consts::PI) / 23.0 * 600.0;
+        assert!((rate - mean).abs() <= bound && bound < 100.0, "{rate} ± {bound}: {mean}");
+        assert!((7200.0..7300.0).contains(&most), "{most}");
+        // A ramp takes twice the mean where it is deepest.
+        let [rate, _, most] = greatest([0.0, 10.0, 0.0], vec![to(36.0, 10.0, -2.0, MoveKind::Cut)]);
+        assert!(rate < 5000.0 && most >= 7200.0, "{rate}, {most}");
+        // Down a steep ramp the bottom cuts all at once.
+        let [_, _, most] = greatest([20.0, 10.0, 0.0], vec![to(21.0, 10.0, -1.0, MoveKind::Cut)]);
+        assert!(most >= 9.0 * std::f64::consts::PI * 600.0 * 0.5f64.sqrt(), "{most}");
+        // A plunge of three cells' length, the first of them in the air, and a rapid move.
+        let plunge = vec![to(20.0, 10.0, -0.1, MoveKind::Plunge), to(20.0, 10.0, 5.0, MoveKind::Rapid)];
+        let [rate, bound, most] = greatest([20.0, 10.0, 0.05], plunge);
+        let truth = 9.0 * std::f64::consts::PI * 600.0;
+        assert!(rate > 0.0 && (rate - truth).abs() <= bound && most >= truth, "{rate} ± {bound}: {truth}");
+    }
+
+    /// Whatever the cells, stock is as large as it is.
+    #[test]
+    fn volumes_end_where_the_stock_does() {
+        let area = Aabb { min: Point3::new(0.0, 0.0, -8.0), max: Point3::new(40.0, 30.0, 1.0) };
+        for cell in [0.33, 0.7, 7.0, 60.0] {
+            let grid = Grid::covering(&area, cell, 1, 1 << 30).unwrap();
+            let passes = (0..9).flat_map(|k| {
+                let (y, x) = (4.0 * f64::from(k), if k % 2 == 0 { 45.0 } else { -5.0 });
+                [to(40.0 - x, y, 0.0, MoveKind::Cut), to(x, y, 0.0, MoveKind::Cut)]
+            });
+            let path = Toolpath::new(ClPoint::upright(Point3::new(-5.0, 0.0, 0.0)), passes.collect());
+            let stock = ZMap::block(grid, 1.0).within(&area);
+            let removal = cut_in_order(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
+            let figures = removal_figures(&path, &removal, &removal.stock.height, 1.0);
+            let off = (figures.volume_mm3 - 1200.0).abs();
+            assert!(off <= figures.volume_error_bound_mm3 + 1e-6, "{cell}: {figures:?}");
+        }
     }
 
     #[test]

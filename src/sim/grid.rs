@@ -103,6 +103,14 @@ impl Grid {
         Ok(Self { origin, cell, nx: nx as usize, ny: ny as usize })
     }
 
+    /// Along one axis, how much of what reaches from `low` to `high` the cell with this centre stands for: the cell, but the
+    /// outermost one that lies in it up to its end.
+    pub fn breadth(&self, centre: f64, [low, high]: [f64; 2]) -> f64 {
+        let from = if centre - self.cell < low { low } else { centre - 0.5 * self.cell };
+        let to = if centre + self.cell > high { high } else { centre + 0.5 * self.cell };
+        to - from
+    }
+
     /// Number of cells.
     pub fn len(&self) -> usize {
         self.nx * self.ny
@@ -142,6 +150,19 @@ impl Grid {
 mod tests {
     use super::*;
     use geometry::Point3;
+
+    /// Whatever the cells, they stand for all of a rectangle and no more.
+    #[test]
+    fn breadths_add_up() {
+        for (cell, from) in [(7.0, 0.0), (0.3, 0.0), (0.11, 0.2), (60.0, 0.0), (0.5, 0.25)] {
+            let area = Aabb { min: Point3::new(-1.0, 0.0, 0.0), max: Point3::new(39.03, 30.0, 1.0) };
+            let grid = Grid::covering(&area, cell, 1, 1 << 30).unwrap();
+            let [low, high] = [-1.0 + from, 39.03 - from];
+            let within = (0..grid.nx).map(|i| grid.centre(i, 0).x).filter(|x| (low..=high).contains(x));
+            let sum: f64 = within.map(|x| grid.breadth(x, [low, high])).sum();
+            assert!((sum - (high - low)).abs() < 1e-9, "{cell}: {sum}");
+        }
+    }
 
     #[test]
     fn the_cell_that_is_said_to_fit_does_fit() {

@@ -30,9 +30,9 @@ use super::bins::MoveBins;
 use super::form::Form;
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
-use super::{NOT_CUT, ZMap};
+use super::{Grid, NOT_CUT, ZMap};
 use cutter::Cutter;
-use geometry::Point3;
+use geometry::{Point2, Point3};
 use leaf::Tally;
 use motion::Toolpath;
 #[doc(hidden)]
@@ -50,7 +50,8 @@ pub const ENGAGED: f64 = 1.0e-4;
 ///
 /// # Tolerance
 /// `volume` is the exact sum over the cells of what left their stored heights, so that the volumes of
-/// all moves add up to the stock before less the stock after. As an integral over the plane it is off
+/// all moves add up to the stock before less the stock after; of cells that hang over the stock's rectangle
+/// ([`ZMap::within`]) what lies in it counts. As an integral over the plane it is off
 /// by `volume_bound` at most, as long as what the move removes is, along each row and column of
 /// cells, one piece with one summit: the sum over a row then errs by a cell times the summit.
 /// `depth`, `axial` and `radial` are taken at cell centres. The true width lies within
@@ -68,6 +69,9 @@ pub struct MoveRemoval {
     /// Greatest height above the tip (abeam of the place) at which the cutter met the stock that it
     /// removed, mm: the axial engagement. It does not depend on how a path is split into moves.
     pub axial: f64,
+    /// Extent of the engaged cells along the plan direction of the move, mm: it is in material no longer than that and its
+    /// radius. 0 of a plunge.
+    pub along: f64,
     /// Extent of the engaged cells across the plan direction of the move, mm; of a plunge the greater
     /// of their extents along x and y.
     pub radial: f64,
@@ -133,7 +137,7 @@ pub fn cut_in_order(
     monitor: &dyn Monitor,
 ) -> Result<Removal, Cancelled> {
     cut_by_tiles(stock, cutter, path, monitor, SIDE, |job, cells, moves| {
-        Tile::load(cells, job.cell).cut(job, cells, moves)
+        Tile::load(cells, job).cut(job, cells, moves)
     })
 }
 
@@ -141,12 +145,21 @@ pub fn cut_in_order(
 struct OrderedCut<'a> {
     /// Side of a cell, mm.
     cell: f64,
+    grid: Grid,
+    within: Option<[Point2; 2]>,
     form: Form,
     path: &'a Toolpath,
     monitor: &'a dyn Monitor,
 }
 
 impl OrderedCut<'_> {
+    /// The share of a cell along an axis that the stock's rectangle holds.
+    fn share(&self, axis: usize, centre: f64) -> f64 {
+        let breadth =
+            |[low, high]: [Point2; 2]| self.grid.breadth(centre, [low[axis], high[axis]]) / self.cell;
+        self.within.map_or(1.0, breadth)
+    }
+
     fn track(&self, index: u32) -> Track {
         let k = index as usize;
         Track::new(self.path.start_of(k), self.path.moves[k].to.tip)
@@ -170,7 +183,8 @@ fn cut_by_tiles(
     cut: impl Fn(&OrderedCut, &mut TileCells, &[u32]) -> Result<TileRecord, Cancelled> + Sync + Send,
 ) -> Result<Removal, Cancelled> {
     check(monitor)?;
-    let job = OrderedCut { cell: stock.grid.cell, form: Form::new(cutter), path, monitor };
+    let (grid, within) = (stock.grid, stock.within);
+    let job = OrderedCut { cell: grid.cell, grid, within, form: Form::new(cutter), path, monitor };
     let bins = MoveBins::new(&stock.grid, side, job.form.radius, path);
     monitor.start("cutting in order", (bins.nx() * bins.ny()) as u64);
     let before = variation(&stock);

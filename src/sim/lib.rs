@@ -15,6 +15,7 @@ mod form;
 mod grid;
 
 mod in_order;
+mod in_stock;
 mod in_turn;
 mod rays;
 mod reference;
@@ -36,6 +37,7 @@ pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
 
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
+pub use in_stock::{InStock, KeptOut, first_in_stock};
 pub use in_turn::{CutHeights, cut_in_order_in_turn, cut_in_turn};
 pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;

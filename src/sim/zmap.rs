@@ -1,6 +1,7 @@
 //! Stock as heights over a grid (three axes, no undercuts).
 
 use super::{Grid, Stock};
+use geometry::{Aabb, Point2};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// In [`ZMap::cut_by`]: no move touched this cell.
@@ -17,6 +18,8 @@ pub struct ZMap {
     pub cut_by: Vec<u32>,
     /// What stood there before the first cut, where its top is not flat.
     pub shape: Option<Shape>,
+    /// The rectangle of the plan that the stock lies in, where its cells may hang over it.
+    pub within: Option<[Point2; 2]>,
 }
 
 /// Stock that is no block, as cells see it from above.
@@ -38,7 +41,19 @@ impl PartialEq for ZMap {
 impl ZMap {
     /// A block with a flat top.
     pub fn block(grid: Grid, top: f64) -> Self {
-        Self { grid, height: vec![top as f32; grid.len()], cut_by: vec![NOT_CUT; grid.len()], shape: None }
+        Self {
+            grid,
+            height: vec![top as f32; grid.len()],
+            cut_by: vec![NOT_CUT; grid.len()],
+            shape: None,
+            within: None,
+        }
+    }
+
+    /// The same where nothing stands beyond a box: volumes count what of the outermost cells lies in it.
+    #[must_use]
+    pub fn within(self, bounds: &Aabb) -> Self {
+        Self { within: Some([bounds.min.xy(), bounds.max.xy()]), ..self }
     }
 
     /// What stands over the cells' centres, seen from above; `bottom` where nothing stands. A roughed block counts as a
@@ -67,7 +82,7 @@ impl ZMap {
             Ok::<Vec<f32>, Cancelled>(centres.map(|q| shape.height_at(q.x, q.y) as f32).collect())
         };
         let height = work::parallel::try_map(grid.ny, row)?.concat();
-        Ok(Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape) })
+        Ok(Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape), within: None })
     }
 
     /// The same stock before the first cut on other cells; `top` is that of a block, mm.

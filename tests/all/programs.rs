@@ -660,6 +660,50 @@ fn stock_has_its_own_shape() {
     }
 }
 
+/// Cells are wider than the cutter, the rib and the step in the block's side: neither is missed.
+#[test]
+fn what_stands_between_the_centres_of_cells_is_met() {
+    let home = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| std::fs::write(home.path().join(name), text).unwrap();
+    file("block.toml", "[stock]\ncorners = [[-5, -5, -20], [21, 13, 0]]\n");
+    let tool = |diameter: f64| {
+        format!(
+            "[[tool]]\nnumber = 1\nshape = \"flat\"\ndiameter = {diameter}\ngauge_length = 80\ncutting_length = 5\n[[tool.holder]]\n\
+                 diameter = {diameter}\nlength = 40\n"
+        )
+    };
+    let claims = |diameter: f64, moves: &[&str]| -> [String; 2] {
+        file("tools.toml", &tool(diameter));
+        let head = ["G21 G90 G17 G94", "T1 M6", "S12000 M3", "G43 H1", "G0 X-13 Y4 Z20"];
+        let program: Vec<String> =
+            head.iter().chain(moves).chain(&["G0 Z20", "M30"]).map(|&line| line.to_owned()).collect();
+        let options = ["--tools", "tools.toml", "--stock", "block.toml"];
+        let report = verify_in(home.path(), &program, &options).1.unwrap();
+        ["rapid", "flute length"].map(|what| {
+            let kinds = ["violations", "undecided", "held"];
+            let of_kind = |kind: &&&str| {
+                let all = report["toolpaths"][0][**kind].as_array();
+                all.is_some_and(|all| all.iter().any(|claim| claim["what"] == what))
+            };
+            kinds.iter().find(of_kind).map_or_else(String::new, |kind| (*kind).to_owned())
+        })
+    };
+    let violated = "violations".to_owned();
+    // Through the block between two rows of cells, and along its side.
+    assert_eq!(claims(0.04, &["G0 Y4.00", "G0 Z-5", "G0 X30"])[0], violated);
+    assert_eq!(claims(6.0, &["G0 Y-20", "G0 Z-5", "G0 X-7.99", "G0 Y30"])[0], violated);
+    assert_eq!(claims(6.0, &["G0 Y-20", "G0 Z-5", "G0 X-8", "G0 Y30"])[0], "held");
+    // A rib of 0.03 mm between two slots, which the third pass takes.
+    let pass = |y: f64, z: f64| format!("G0 X-13 Y{y}\nG1 Z{z} F600\nX30\nG0 Z20");
+    let rib = |wide: f64, deep: f64| {
+        let (low, high) = (pass(4.0 - 3.0 - 0.5 * wide, -4.0), pass(4.0 + 3.0 + 0.5 * wide, -4.0));
+        claims(6.0, &[&low, &high, &pass(4.0, deep)])
+    };
+    assert_eq!(rib(0.03, -6.0)[1], violated);
+    let layers = claims(6.0, &[&pass(4.0, -4.0), &pass(4.0, -8.0), &pass(4.0, -12.0)]);
+    assert_eq!([rib(0.03, -4.5), layers], [["held"; 2], ["held"; 2]]);
+}
+
 /// A mesh of the block around the part is that block.
 #[test]
 fn stock_of_a_mesh_is_measured_as_the_same_block() {

@@ -1,9 +1,10 @@
 //! What the moves take from the stock in the order of the program, and rapid moves in stock.
 
 use cutter::Solid;
-use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
+use metrology::{RapidContactFigures, RemovalFigures, View, removal_figures, voxel_removal_figures};
+use motion::MoveKind;
 use report::{Claim, Figure, Gravity, Verdict, place};
-use sim::{MoveRemoval, Stock, VoxelEngine, ZMap, cut_in_order_in_turn};
+use sim::{ENGAGED, InStock, KeptOut, MoveRemoval, Stock, VoxelEngine, ZMap, cut_in_order_in_turn};
 use work::monitor::Monitor;
 
 use super::entries;
@@ -15,7 +16,7 @@ use crate::run::{Finding, Run};
 const MEANING: (&str, &str) = (
     "removal",
     "What the moves take from the stock in the order of the program, at the programmed feed. The rate \
-     is the mean over a few cells of travel; engagement is how high the cutter meets stock and how \
+     is the mean over a few cells of travel, and of a long move over what it cuts; engagement is how high the cutter meets stock and how \
      wide a move cuts. No rapid move may touch stock.",
 );
 
@@ -31,11 +32,16 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     if !run.scene().simulation.removal {
         return Ok(Finding::default());
     }
+    let mut unseen = None;
     let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
             let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
-            (removal_figures(run.path(), &removed, &cut.height, run.session.top()), removed.moves)
+            let mut figures = removal_figures(run.path(), &removed, &cut.height, run.session.top());
+            if figures.rapid_contacts.is_empty() {
+                unseen = rapid_unseen(run, &mut figures, monitor)?;
+            }
+            (figures, removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
     };
@@ -43,12 +49,17 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         contact.line = run.line(contact.move_index);
         contact.tool = run.path().named_tool_of(contact.move_index as usize);
     }
-    let mut claims = vec![no_rapid_in_stock(&r, run.path().program_name())];
+    let mut claims = vec![match unseen {
+        Some(open) => rapid_open(run, &open),
+        None => no_rapid_in_stock(&r, run.path().program_name()),
+    }];
     if run.request.foreign().is_some_and(|read| read.unknown_before) {
         doubt(&mut claims, TOOLS_BEFORE);
     }
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
+    let at_most = r.material_removal_rate_at_most_mm3_min;
+    let at_most = at_most.map_or_else(String::new, |rate| format!(", nowhere over {:.0}", rate.ceil()));
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
     let (axial, axial_bound) = (r.max_axial_engagement_mm, r.max_axial_engagement_error_bound_mm);
     // A bound beyond the figure is that of what was there before the first cut.
@@ -59,13 +70,13 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     };
     let rows = vec![
         ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
-        ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
+        ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min{at_most}")),
         ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
         ("engagement, axial and radial", format!("{axial}, {:.2} mm", r.max_radial_engagement_mm)),
     ];
     let figure =
         Figure { key: "removal", value: value(&r)?, rows, meaning: Some(MEANING), ..Figure::default() };
-    let entries = entries::of(run, &moves);
+    let entries = entries::of(run, &moves, r.max_axial_engagement_error_bound_mm, monitor)?;
     claims.extend(entries.claims);
     Ok(Finding { figure: Some(figure), claims, notes: entries.notes })
 }
@@ -79,12 +90,54 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
 
 /// The stock, less what other toolpaths and other tools of a program from elsewhere cut before.
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
-    let mut stock = cut.uncut(cut.grid, run.session.top(), monitor)?;
+    let mut stock = cut.uncut(cut.grid, run.session.top(), monitor)?.within(&run.session.area());
     for (cutter, path) in run.before() {
         stock = sim::cut(stock, &cutter, &path, monitor)?;
         stock.cut_by.fill(sim::NOT_CUT);
     }
     Ok(stock)
+}
+
+/// The first move that is not shown to keep out of what stands when it comes, as cells see the stock: a roughed block is whole.
+pub(super) fn first_in_stock(
+    run: &Run<'_>,
+    asked: impl Fn(usize) -> Option<KeptOut> + Sync + Send,
+    monitor: &dyn Monitor,
+) -> Result<Option<InStock>, JobError> {
+    let stock = match run.session.roughed_stock() {
+        Stock::Roughed { block, .. } => Stock::Box(block),
+        stock => stock,
+    };
+    let (path, cutters) = (run.path(), run.own_cutters);
+    let strays = path.origin.strays;
+    Ok(sim::first_in_stock(&stock, &run.before(), cutters, path, strays, asked, monitor)?)
+}
+
+/// A rapid move in stock that stands between the centres of cells: listed where it is certain, and else returned.
+fn rapid_unseen(
+    run: &Run<'_>,
+    figures: &mut RemovalFigures,
+    monitor: &dyn Monitor,
+) -> Result<Option<InStock>, JobError> {
+    let rapid = |k: usize| (run.path().moves[k].kind == MoveKind::Rapid).then_some(KeptOut::Cutter);
+    let Some(found) = first_in_stock(run, rapid, monitor)? else { return Ok(None) };
+    let Some(depth_mm) = found.depth else { return Ok(Some(found)) };
+    let (move_index, at_mm) = (found.move_index, found.at.into());
+    figures.rapid_contacts = vec![RapidContactFigures { move_index, line: 0, tool: None, at_mm, depth_mm }];
+    figures.rapid_contact_count = 1;
+    Ok(None)
+}
+
+/// That a rapid move may touch stock.
+fn rapid_open(run: &Run<'_>, open: &InStock) -> Claim {
+    let text = format!(
+        "whether a rapid move touches stock at {}, move {}{}, is open",
+        place(open.at.into()),
+        open.move_index,
+        run.program_line(open.move_index)
+    );
+    let claim = Claim::length("rapid", Gravity::Crash, ENGAGED, 0.0, f64::INFINITY).told(text);
+    Claim { decided_by: "a rapid move farther from what stands would decide it", ..claim }
 }
 
 /// The voxel of removal in order, mm.
@@ -104,9 +157,10 @@ fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<(RemovalFigures, Ve
 
 /// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks the cutter.
 fn no_rapid_in_stock(removal: &RemovalFigures, program: &str) -> Claim {
-    let claim = |depth| Claim::length("rapid", Gravity::Crash, 0.0, depth, 0.0);
+    // Less is a touch.
+    let claim = |depth, bound| Claim::length("rapid", Gravity::Crash, ENGAGED, depth, bound);
     let Some(first) = removal.rapid_contacts.first() else {
-        return claim(0.0).told("no rapid move touches stock".into());
+        return claim(0.0, ENGAGED).told("no rapid move touches stock".into());
     };
     let deepest = removal.rapid_contacts.iter().map(|c| c.depth_mm).fold(0.0, f64::max);
     let mut text = format!(
@@ -125,7 +179,7 @@ fn no_rapid_in_stock(removal: &RemovalFigures, program: &str) -> Claim {
         2 => text += ", and one more rapid move does",
         n => text += &format!(", and {} more rapid moves do", n - 1),
     }
-    claim(deepest).told(text)
+    claim(deepest, 0.0).told(text)
 }
 
 #[cfg(test)]
@@ -134,7 +188,6 @@ mod tests {
 
     #[test]
     fn the_first_rapid_in_stock_is_told_with_its_line() {
-        use metrology::RapidContactFigures;
         assert_eq!(no_rapid_in_stock(&RemovalFigures::default(), "").verdict(), report::Verdict::Pass);
         let contact = |depth_mm| RapidContactFigures {
             move_index: 7,

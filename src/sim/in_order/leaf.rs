@@ -29,7 +29,7 @@ pub(super) const UNTOUCHED: f64 = -1.0;
 /// What a move removed so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tally {
-    /// Sum over the cells of the height removed.
+    /// Sum over the cells of the height removed, each by the share of it that counts.
     pub sum: f64,
     /// Greatest height removed at a cell.
     pub depth: f64,
@@ -59,8 +59,8 @@ impl Tally {
     }
 
     /// Adds one cell that was lowered.
-    pub fn add_cell(&mut self, drop: f64, now: f64, track: &Track, along: f64, across: f64) {
-        self.sum += drop;
+    pub fn add_cell(&mut self, drop: f64, share: f64, now: f64, track: &Track, along: f64, across: f64) {
+        self.sum += drop * share;
         self.depth = larger(self.depth, drop);
         if drop > ENGAGED {
             self.axial = larger(self.axial, now - track.tip(smaller(larger(along, 0.0), track.length)));
@@ -91,6 +91,7 @@ impl Tally {
             volume_bound,
             depth: self.depth,
             axial: self.axial,
+            along: if track.length > 0.0 { along } else { 0.0 },
             radial,
             radial_bound,
         }
@@ -158,12 +159,13 @@ impl Leaf {
         simd: S,
         bound: &Bound<W>,
         centres: [&[f64; LEAF]; 2],
+        shares: [&[f64; LEAF]; 2],
         index: u32,
         lanes: &mut Lanes,
     ) -> bool {
         let cells = Cells::new(simd, centres, bound.track);
         let heights = cells.heights(bound, self.height.as_flattened());
-        self.lower(simd, bound.track, &cells, &heights, index, lanes)
+        self.lower(simd, bound.track, &cells, &heights, shares, index, lanes)
     }
 
     #[inline(always)]
@@ -173,6 +175,7 @@ impl Leaf {
         track: &Track,
         cells: &Cells,
         heights: &[[f64; LEAF]; LEAF],
+        [columns, rows]: [&[f64; LEAF]; 2],
         index: u32,
         lanes: &mut Lanes,
     ) -> bool {
@@ -196,7 +199,7 @@ impl Leaf {
                 *now = simd.select_f64s(lower, stored, before);
                 *by = simd.select_f64s(lower, rank, *by);
                 let drop = simd.select_f64s(lower, simd.sub_f64s(before, stored), zero);
-                sum = simd.add_f64s(sum, drop);
+                sum = simd.add_f64s(sum, simd.mul_f64s(drop, simd.splat_f64s(rows[j])));
                 depth = simd.max_f64s(depth, drop);
                 let engaged = simd.less_than_f64s(engaged_drop, drop);
                 let above = simd.sub_f64s(before, tip_abeam(simd, track, along));
@@ -206,6 +209,7 @@ impl Leaf {
                 across_low = simd.min_f64s(across_low, simd.select_f64s(engaged, across, none));
                 across_high = simd.max_f64s(across_high, simd.select_f64s(engaged, across, beyond));
             }
+            sum = simd.mul_f64s(sum, S::as_simd_f64s(columns).0[v]);
             most = simd.max_f64s(most, depth);
             let join = |all: &mut [f64; LEAF], one: S::f64s, f: fn(S, S::f64s, S::f64s) -> S::f64s| {
                 let all = &mut S::as_mut_simd_f64s(all).0[v];

@@ -43,7 +43,8 @@ fn cut(job: &OrderedCut, cells: &mut TileCells, moves: &[u32]) -> TileRecord {
                 if stored < heights[i] {
                     let now = f64::from(heights[i]);
                     let (along, across) = track.along_across(x, y);
-                    tally.add_cell(now - f64::from(stored), now, &track, along, across);
+                    let share = job.share(0, x) * job.share(1, y);
+                    tally.add_cell(now - f64::from(stored), share, now, &track, along, across);
                     (heights[i], cut_by[i]) = (stored, index);
                 }
             }

@@ -27,6 +27,8 @@ pub(super) struct Tile {
     /// Centres of the columns and rows, also of those beyond the grid.
     x: [[f64; LEAF]; SIDE / LEAF],
     y: [[f64; LEAF]; SIDE / LEAF],
+    /// How much of them counts.
+    shares: [[[f64; LEAF]; SIDE / LEAF]; 2],
     cell: f64,
     leaves: Vec<[Leaf; CHILDREN]>,
     /// Ceilings of the leaves of each node, and of the nodes.
@@ -41,7 +43,8 @@ fn place(n: usize, l: usize) -> (usize, usize) {
 }
 
 impl Tile {
-    pub fn load(cells: &TileCells, cell: f64) -> Self {
+    pub fn load(cells: &TileCells, job: &OrderedCut) -> Self {
+        let cell = job.cell;
         let axis = |given: &[f64]| {
             let last = given.len() - 1;
             // Extrapolated beyond the grid, so that bounds about a leaf's middle stay true.
@@ -49,9 +52,14 @@ impl Tile {
             let at = |k: usize| given.get(k).copied().unwrap_or_else(|| beyond(k));
             std::array::from_fn(|leaf| std::array::from_fn(|k| at(leaf * LEAF + k)))
         };
+        let (x, y) = (axis(&cells.x), axis(&cells.y));
+        let shares = |axis: usize, centres: [[f64; LEAF]; SIDE / LEAF]| {
+            centres.map(|leaf| leaf.map(|centre| job.share(axis, centre)))
+        };
         let mut tile = Self {
-            x: axis(&cells.x),
-            y: axis(&cells.y),
+            x,
+            y,
+            shares: [shares(0, x), shares(1, y)],
             cell,
             leaves: vec![std::array::from_fn(|_| Leaf::beyond()); CHILDREN],
             nodes: vec![Ceilings::nothing(); CHILDREN],
@@ -192,7 +200,8 @@ impl Tile {
         if let Some(watch) = rapid {
             watch.look(leaf, x, y);
         }
-        let changed = leaf.cut(simd, bound, [x, y], index, lanes);
+        let shares = [&self.shares[0][column], &self.shares[1][row]];
+        let changed = leaf.cut(simd, bound, [x, y], shares, index, lanes);
         if changed {
             self.nodes[n].set(l, leaf_ceiling(leaf, self.cell));
         }

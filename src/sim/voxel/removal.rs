@@ -160,6 +160,7 @@ impl Tally {
             volume_bound: PLANE * self.partial * voxel.powi(3),
             depth: self.share * voxel,
             axial: self.axial,
+            along: f64::INFINITY,
             radial,
             radial_bound,
         }

@@ -57,6 +57,9 @@ pub(crate) static DEFINITION: Definition = Definition {
     read: |from| Ok(Box::new(Waterline { steps: from.section.choice("step", &STEPS)? })),
 };
 
+/// Shares of the surface below this are not told: in tenths of a per cent they are none.
+const LEAST_TOLD: f64 = 5e-4;
+
 impl Strategy for Waterline {
     fn definition(&self) -> &'static Definition {
         &DEFINITION
@@ -76,7 +79,7 @@ impl Strategy for Waterline {
             let field = ScalarField::Grid(heights(&chart, cutter)?);
             let level = level_share(&chart, cutter, &field, settings);
             all.append(along_levels_placed(task, &chart, &field, self.steps)?);
-            if level > 0.0 {
+            if level >= LEAST_TOLD {
                 all.notes.push(format!(
                     "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",
                     100.0 * level
