@@ -349,7 +349,7 @@ impl Inspection<'_> {
         let is_own = |lean: f64| lean >= self.steepest;
         let on = |point: &Point3, normal: &Vector3, half: f64| {
             let (d, _) = self.along_normal(point, normal).filter(|_| is_own(normal.z))?;
-            Some((point.xy().into(), value(&d, normal.z, half)))
+            Some((point.xy(), value(&d, normal.z, half)))
         };
         let at = |q: Point2, half: f64| {
             let centre = self.design_at(q).and_then(|design| on(&design.point, &design.normal, half));
