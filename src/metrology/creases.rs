@@ -204,7 +204,7 @@ mod tests {
         };
         let mut all = Vec::new();
         for cell in [0.03, 0.07, 0.1, 0.13, 0.31] {
-            let found = gouge_of(&roof, &cutter, &[pass.clone()], cell);
+            let found = gouge_of(&roof, &cutter, std::slice::from_ref(&pass), cell);
             let most = found.max_depth_mm + found.error_bound_mm;
             assert!(found.max_depth_mm >= truth - 1e-6, "{cell}: {} {truth}", found.max_depth_mm);
             all.push([found.max_depth_mm, most]);
