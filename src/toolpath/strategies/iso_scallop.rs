@@ -120,6 +120,10 @@ fn read_start(from: &Reading<'_>) -> Result<FrontStart, SceneError> {
     Ok(FrontStart::Line([[a, b], [c, d]]))
 }
 
+/// What is told where a part has creases, holes or steps.
+const ROUNDED: &str = "fronts run on a smooth surface over the mesh, which rounds its creases and goes on over its holes: a streamline is \
+                       planned on the facets themselves";
+
 impl Strategy for IsoScallop {
     fn definition(&self) -> &'static Definition {
         &DEFINITION
@@ -135,6 +139,9 @@ impl Strategy for IsoScallop {
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let mut all = Passes::default();
+        if task.wants_mesh && task.part.patches().is_empty() {
+            all.notes.push(ROUNDED.to_owned());
+        }
         let charts = Chart::all(task.part, task.cutter, task.settings.guide())?;
         for (k, chart) in charts.iter().enumerate() {
             all.append(match task.earlier_on_chart(k, charts.len()) {
@@ -514,5 +521,32 @@ mod tests {
         let highest = chart.grid(60).map(|[u, v]| field.value_and_gradient(u, v)[0]).fold(0.0, f64::max);
         // No place is farther from the border than this way over the part.
         assert!(highest < 25.0 / narrowest, "{highest} of {narrowest}");
+    }
+
+    /// A roof of two facets has a crease longer than the cutter is wide, a plane has none.
+    #[test]
+    fn fronts_that_round_creases_say_so() {
+        for (ridge, is_told) in [(3.0, true), (0.0, false)] {
+            let corners = [
+                [-4.0, 0.0, 0.0],
+                [0.0, 0.0, ridge],
+                [4.0, 0.0, 0.0],
+                [-4.0, 12.0, 0.0],
+                [0.0, 12.0, ridge],
+                [4.0, 12.0, 0.0],
+            ];
+            let triangles = vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]];
+            let mesh = geometry::TriangleMesh::new(corners.map(Point3::from).to_vec(), triangles).unwrap().0;
+            let part = Part::from_mesh(mesh);
+            let settings = crate::vocabulary::PlanSettings {
+                step: Step::Scallop(0.05),
+                stock_top: ridge + 1.0,
+                ..Default::default()
+            };
+            let iso = IsoScallop { start: FrontStart::BestBorder };
+            let plan =
+                crate::plan::plan(&part, &Cutter::ball(4.0).unwrap(), &iso, &settings, &Silent).unwrap();
+            assert_eq!(plan.notes.iter().any(|note| note == ROUNDED), is_told, "{:?}", plan.notes);
+        }
     }
 }
