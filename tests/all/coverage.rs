@@ -1,9 +1,11 @@
 //! What a verdict covers: surface that upright tools see, walls, undersides, and parts of which nothing is measured.
 
+use std::path::Path;
+
 use millstream::geometry::{Aabb, Point3};
 use serde_json::Value;
 
-use crate::support::{number, run_scene, write_stl};
+use crate::support::{number, run_changed, run_scene, write_stl};
 
 /// Triangles of the faces of a box, outward.
 fn faces(low: [f64; 3], high: [f64; 3]) -> Vec<[Point3; 3]> {
@@ -119,6 +121,19 @@ fn what_stands_between_never_cut_places_is_in_the_bound() {
     let truth = 0.2 / 2.0_f64.sqrt();
     assert_eq!(exit, 1);
     assert!(highest < truth + 1e-3 && highest + bound > truth, "{highest} {bound} {truth}");
+}
+
+/// Along the border of an offset surface normals lead out of the block at once, and moves go on beyond it: what they leave around there is
+/// known as well as elsewhere.
+#[test]
+fn what_moves_leave_at_the_side_of_the_block_is_bounded() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sources/offset_12.toml");
+    let sections = format!("sections = \"{}/", scene.parent().unwrap().display());
+    let words = [["sections = \"", sections.as_str()]];
+    let (exit, report) = run_changed(&scene, &words, |toolpath| toolpath.contains("along normals"));
+    let excess = &report["toolpaths"][0]["excess"];
+    let [highest, bound] = ["/max_mm", "/error_bound_mm"].map(|key| number(excess, key));
+    assert!(exit == 0 && highest + bound < 0.06 && bound < 0.003, "{excess:#}");
 }
 
 #[test]

@@ -23,6 +23,13 @@ const BEYOND_MM: f64 = 1e-5;
 /// with a lesser one rays along the edge graze every pass over it, which takes as long as all others.
 const AT_EDGE: f64 = 1e-3;
 
+/// How often what surrounds a place where nothing was cut is divided. Each takes four times the lines, and has a quarter of what moves rise
+/// by aside.
+const DIVISIONS: u32 = 2;
+
+/// The cosine between normals of one face so near to each other.
+const SAME_FACE: f64 = 0.97;
+
 /// The cut along the normals of surface that no cell sees.
 pub(super) struct UnseenCut<'a> {
     pub cut: &'a SweptVolume<'a>,
@@ -71,6 +78,31 @@ impl UnseenCut<'_> {
         Some(NormalHit { deviation: 0.0, normal: *normal, way: Way::Normal, ..capped })
     }
 
+    /// How high all places of a square, `aside` mm to each side along the surface, are left at most; infinite where the move over its
+    /// middle does not pass over all of it. What one move leaves is a convex function: it is greatest at a corner. The square is divided
+    /// so often.
+    fn left_within(&self, point: &Point3, normal: &Vector3, aside: f64, divisions: u32) -> f64 {
+        let Some(hit) = self.cut.hit(point, normal, None) else { return f64::INFINITY };
+        let Some(along) = normal.cross(&normal.yzx()).try_normalize(1e-9) else { return f64::INFINITY };
+        let across = normal.cross(&along);
+        let foot =
+            |[a, b]: [f64; 2]| self.cut.part.closest_point(&(point + (along * a + across * b) * aside)).0;
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+        // Beyond the end of the face its end tells, along the normal of the face.
+        let left = |corner| self.cut.cut_by(&foot(corner).point, normal, hit.by);
+        let left = corners.map(|corner| left(corner).map_or(f64::INFINITY, |left| left.s));
+        let whole = left.into_iter().fold(hit.deviation, f64::max);
+        if divisions == 0 {
+            return whole;
+        }
+        let quarters = corners.map(|corner| {
+            let middle = foot(corner.map(|x| 0.5 * x));
+            let own = if middle.normal.dot(normal) > SAME_FACE { &middle.normal } else { normal };
+            self.left_within(&middle.point, own, 0.5 * aside, divisions - 1)
+        });
+        whole.min(quarters.into_iter().fold(0.0, f64::max))
+    }
+
     /// Whether the line through a place stays below all that cuts.
     fn is_below_all(&self, point: &Point3, normal: &Vector3) -> bool {
         let highest = (normal.z * self.cut.outward).max(-normal.z * self.cut.inward);
@@ -116,7 +148,13 @@ impl AlongNormal for UnseenCut<'_> {
             0.0
         } else {
             // Places at level edges tell nothing: those beside them stand for these as well.
-            self.reach().min(self.cut.way_out_within(point, normal, 2.0 * within))
+            let aside = 2.0 * within;
+            let out = self.reach().min(self.cut.way_out_within(point, normal, aside));
+            if out > NUMERICAL_FLOOR {
+                out.min(self.left_within(point, normal, aside, DIVISIONS))
+            } else {
+                out
+            }
         }
     }
 
