@@ -6,14 +6,14 @@
 use std::collections::HashMap;
 
 use super::facing::LEAST_FACING;
-use geometry::{Point2, Point3, TriangleMesh, Vector3};
+use geometry::{Point2, Point3, TriangleMesh, Vector2, Vector3};
 use part::{Part, PatchPoint};
 use sim::Grid;
 
 /// Faces meet at a crease where the cosine between their normals is less: 5 degrees. At flatter ones both are cut about as deep.
 const CREASED: f64 = 0.9962;
 
-/// Squares of the plan in which creases are listed have this side, mm, or more where creases are long.
+/// Squares of the plan in which creases are listed have this side, mm, or more where creases are longer in the mean.
 const LEAST_SIDE: f64 = 0.25;
 
 /// So far within a triangle, as a share of it, its side is on its own face and not on the other one.
@@ -51,17 +51,13 @@ impl Creases {
         let sides: Vec<Side> = (0..mesh.triangles().len())
             .flat_map(|t| (0..3).filter_map(move |k| side_of(part, t, k)))
             .collect();
-        let longest = sides.iter().map(|side| (side.ends[1] - side.ends[0]).xy().norm()).fold(0.0, f64::max);
-        // A crease lies in a few squares.
-        let side = LEAST_SIDE.max(0.25 * longest);
+        let length: f64 = sides.iter().map(|side| (side.ends[1] - side.ends[0]).xy().norm()).sum();
+        let side = LEAST_SIDE.max(length / sides.len().max(1) as f64);
         let mut of = HashMap::<[i64; 2], Vec<u32>>::new();
         for (k, crease) in sides.iter().enumerate() {
-            let [xs, ys] = [0, 1].map(|c| {
-                let [a, b] = crease.ends.map(|end| end[c]);
-                (a.min(b) / side).floor() as i64..=(a.max(b) / side).floor() as i64
-            });
-            for i in xs {
-                ys.clone().for_each(|j| of.entry([i, j]).or_default().push(k as u32));
+            let ends = crease.ends.map(|end| end.coords.xy() / side);
+            for square in squares_along(ends, [[f64::NEG_INFINITY, f64::INFINITY]; 2]) {
+                of.entry(square).or_default().push(k as u32);
             }
         }
         Self { sides, side, of, off: part.mesh_deviation() }
@@ -158,21 +154,29 @@ fn clipped(side: &Side, centre: Point2, half: f64) -> Option<[f64; 2]> {
 
 /// The cells of a grid that a side runs through.
 fn cells_along(side: &Side, grid: &Grid) -> Vec<usize> {
-    let [a, b] = side.ends.map(|end| (end.xy() - grid.origin) / grid.cell);
+    let ends = side.ends.map(|end| (end.xy() - grid.origin) / grid.cell + Vector2::new(0.5, 0.5));
+    let squares = squares_along(ends, [grid.nx, grid.ny].map(|n| [0.0, n as f64])).into_iter();
+    let cell = |[i, j]: [i64; 2]| Some((usize::try_from(i).ok()?, usize::try_from(j).ok()?));
+    let within = squares.filter_map(cell).filter(|&(i, j)| i < grid.nx && j < grid.ny);
+    within.map(|(i, j)| grid.index(i, j)).collect()
+}
+
+/// The squares of side 1 that a line runs through, by the whole numbers at their lower corners; those within two ranges, and some beyond.
+fn squares_along([a, b]: [Vector2; 2], ranges: [[f64; 2]; 2]) -> Vec<[i64; 2]> {
     let mut cuts = vec![0.0, 1.0];
-    for c in 0..2 {
-        let (low, high) = (a[c].min(b[c]), a[c].max(b[c]));
-        let most = if c == 0 { grid.nx } else { grid.ny } as f64;
-        let (first, last) = ((low + 0.5).ceil().max(0.0), (high + 0.5).floor().min(most));
+    for (c, [least, most]) in ranges.into_iter().enumerate() {
+        let (first, last) = (a[c].min(b[c]).ceil().max(least), a[c].max(b[c]).floor().min(most));
         let lines = (0..).map(|k| first + f64::from(k)).take_while(|line| *line <= last);
-        cuts.extend(lines.map(|line| (line - 0.5 - a[c]) / (b[c] - a[c])).filter(|share| share.is_finite()));
+        cuts.extend(lines.map(|line| (line - a[c]) / (b[c] - a[c])).filter(|share| share.is_finite()));
     }
     cuts.sort_by(f64::total_cmp);
-    let cell = |w: &[f64]| {
-        let place = grid.origin + (a + (b - a) * (0.5 * (w[0] + w[1]))) * grid.cell;
-        grid.cell_at(place.x, place.y).map(|(i, j)| grid.index(i, j))
+    let square = |w: &[f64]| {
+        let middle = a + (b - a) * (0.5 * (w[0] + w[1]));
+        [middle.x.floor() as i64, middle.y.floor() as i64]
     };
-    cuts.windows(2).filter_map(cell).collect()
+    let mut squares: Vec<[i64; 2]> = cuts.windows(2).map(square).collect();
+    squares.dedup();
+    squares
 }
 
 #[cfg(test)]
@@ -180,6 +184,23 @@ mod tests {
     use super::*;
     use crate::flat_scene::gouge_of;
     use cutter::Cutter;
+
+    #[test]
+    fn lines_run_through_the_squares_that_they_cross() {
+        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let along = |a: [f64; 2], b: [f64; 2]| squares_along([a, b].map(Vector2::from), free);
+        assert_eq!(along([0.2, 0.1], [0.7, 0.9]), [[0, 0]]);
+        assert_eq!(along([-0.5, 0.25], [2.5, 1.5]), [[-1, 0], [0, 0], [1, 0], [1, 1], [2, 1]]);
+        assert_eq!(along([1.0, -1.5], [1.0, 1.5]), [[1, -2], [1, -1], [1, 0], [1, 1]]);
+        assert_eq!(along([0.3, 0.3], [0.3, 0.3]), [[0, 0]]);
+        // Every place of a line lies in one of them.
+        let (a, b) = (Vector2::new(-3.31, 7.92), Vector2::new(11.4, -2.77));
+        let squares = squares_along([a, b], free);
+        for k in 0..=10_000 {
+            let place = a + (b - a) * (f64::from(k) * 1e-4);
+            assert!(squares.contains(&[place.x.floor() as i64, place.y.floor() as i64]), "{place}");
+        }
+    }
 
     /// A roof of 60 and 10 degrees: the crest is cut where the centres of no cell lie.
     #[test]
