@@ -338,7 +338,9 @@ fn answers_later(toolpath: Option<&mut ToolpathReport>, left: &[Claim], next: &s
     if let Some(ToolpathReport::Measured(result)) = toolpath
         && left.iter().any(|claim| claim.verdict() != Verdict::Pass)
     {
-        result.notes.push(format!("what it leaves above the design is judged behind {next}, which cuts on"));
+        result.notes.push(format!(
+            "the material that it leaves is judged after {next}, which cuts the same stock next"
+        ));
     }
 }
 

@@ -69,13 +69,24 @@ struct PlaceDepth {
     inside: f64,
 }
 
+/// The design at a share of the side of a triangle, whose ends have parameters on a patch, and the normal there.
+pub(super) fn design_along(
+    part: &Part,
+    ends: &[Point3; 2],
+    at: Option<[PatchPoint; 2]>,
+    normal: Vector3,
+    share: f64,
+) -> (Point3, Vector3) {
+    match at {
+        Some([a, b]) => part.point_and_normal(a.toward(&b, share)),
+        None => (ends[0] + (ends[1] - ends[0]) * share, normal),
+    }
+}
+
 impl BorderPiece {
     /// The design at a share of the piece, and its normal there.
     fn design(&self, part: &Part, share: f64) -> (Point3, Vector3) {
-        match self.at {
-            Some([a, b]) => part.point_and_normal(a.toward(&b, share)),
-            None => (self.ends[0] + (self.ends[1] - self.ends[0]) * share, self.normal),
-        }
+        design_along(part, &self.ends, self.at, self.normal, share)
     }
 
     /// Whether a way down against the normal of a place leads out over the border.

@@ -3,18 +3,14 @@
 //!
 //! Enters: the part. Leaves: the stretches of creases in squares of the plan, with the normals of both faces.
 
-use std::collections::HashMap;
-
+use super::border_cuts::design_along;
 use super::facing::LEAST_FACING;
-use geometry::{Point2, Point3, TriangleMesh, Vector2, Vector3};
+use geometry::{CurveSegment, Point2, Point3, SegmentGrid, TriangleMesh, Vector2, Vector3};
 use part::{Part, PatchPoint};
 use sim::Grid;
 
 /// Faces meet at a crease where the cosine between their normals is less: 5 degrees. At flatter ones both are cut about as deep.
 const CREASED: f64 = 0.9962;
-
-/// Squares of the plan in which creases are listed have this side, mm, or more where creases are longer in the mean.
-const LEAST_SIDE: f64 = 0.25;
 
 /// So far within a triangle, as a share of it, its side is on its own face and not on the other one.
 const WITHIN: f64 = 1e-6;
@@ -37,10 +33,8 @@ struct Side {
 /// The creases that an upright cutter can face.
 pub(super) struct Creases {
     sides: Vec<Side>,
-    /// Of the squares, mm.
-    side: f64,
-    /// The sides of creases in each.
-    of: HashMap<[i64; 2], Vec<u32>>,
+    /// The same in the plan.
+    in_plan: SegmentGrid,
     /// How far triangles are off the part, mm.
     off: f64,
 }
@@ -51,16 +45,12 @@ impl Creases {
         let sides: Vec<Side> = (0..mesh.triangles().len())
             .flat_map(|t| (0..3).filter_map(move |k| side_of(part, t, k)))
             .collect();
-        let length: f64 = sides.iter().map(|side| (side.ends[1] - side.ends[0]).xy().norm()).sum();
-        let side = LEAST_SIDE.max(length / sides.len().max(1) as f64);
-        let mut of = HashMap::<[i64; 2], Vec<u32>>::new();
-        for (k, crease) in sides.iter().enumerate() {
-            let ends = crease.ends.map(|end| end.coords.xy() / side);
-            for square in squares_along(ends, [[f64::NEG_INFINITY, f64::INFINITY]; 2]) {
-                of.entry(square).or_default().push(k as u32);
-            }
-        }
-        Self { sides, side, of, off: part.mesh_deviation() }
+        let in_plan = sides.iter().zip(0..).map(|(side, curve)| {
+            let ends = side.ends.map(|end| end.xy());
+            CurveSegment { ends, curve, index: 0 }
+        });
+        let in_plan = SegmentGrid::new(in_plan.collect());
+        Self { sides, in_plan, off: part.mesh_deviation() }
     }
 
     /// The cells of a grid with a crease, in their order.
@@ -73,17 +63,10 @@ impl Creases {
 
     /// The middles of the stretches of creases in a square of the plan, also on its sides, each with the normal of one of its faces.
     pub fn within(&self, part: &Part, centre: Point2, half: f64) -> Vec<(Point3, Vector3)> {
-        if self.sides.is_empty() {
-            return Vec::new();
-        }
         let half = half + ON_SIDE;
-        let [xs, ys] = [centre.x, centre.y]
-            .map(|x| ((x - half) / self.side).floor() as i64..=((x + half) / self.side).floor() as i64);
-        let mut near: Vec<u32> = xs
-            .flat_map(|i| ys.clone().filter_map(move |j| self.of.get(&[i, j])))
-            .flatten()
-            .copied()
-            .collect();
+        let corner = |reach: f64| Point2::new(centre.x + reach, centre.y + reach);
+        let mut near = Vec::new();
+        self.in_plan.near(&[corner(-half), corner(half)], |side| near.push(side));
         near.sort_unstable();
         near.dedup();
         let place = |k: u32| {
@@ -101,10 +84,7 @@ impl Creases {
 impl Side {
     /// The design at a share of the crease, and the normal of the face there.
     fn design(&self, part: &Part, share: f64) -> (Point3, Vector3) {
-        match self.at {
-            Some([a, b]) => part.point_and_normal(a.toward(&b, share)),
-            None => (self.ends[0] + (self.ends[1] - self.ends[0]) * share, self.normal),
-        }
+        design_along(part, &self.ends, self.at, self.normal, share)
     }
 }
 
@@ -155,17 +135,18 @@ fn clipped(side: &Side, centre: Point2, half: f64) -> Option<[f64; 2]> {
 /// The cells of a grid that a side runs through.
 fn cells_along(side: &Side, grid: &Grid) -> Vec<usize> {
     let ends = side.ends.map(|end| (end.xy() - grid.origin) / grid.cell + Vector2::new(0.5, 0.5));
-    let squares = squares_along(ends, [grid.nx, grid.ny].map(|n| [0.0, n as f64])).into_iter();
+    let squares = squares_along(ends, [grid.nx, grid.ny].map(|n| n as f64)).into_iter();
     let cell = |[i, j]: [i64; 2]| Some((usize::try_from(i).ok()?, usize::try_from(j).ok()?));
     let within = squares.filter_map(cell).filter(|&(i, j)| i < grid.nx && j < grid.ny);
     within.map(|(i, j)| grid.index(i, j)).collect()
 }
 
-/// The squares of side 1 that a line runs through, by the whole numbers at their lower corners; those within two ranges, and some beyond.
-fn squares_along([a, b]: [Vector2; 2], ranges: [[f64; 2]; 2]) -> Vec<[i64; 2]> {
+/// The squares of side 1 that a line runs through, by the whole numbers at their lower corners: all from 0 to what is `most` along both,
+/// and some others.
+fn squares_along([a, b]: [Vector2; 2], most: [f64; 2]) -> Vec<[i64; 2]> {
     let mut cuts = vec![0.0, 1.0];
-    for (c, [least, most]) in ranges.into_iter().enumerate() {
-        let (first, last) = (a[c].min(b[c]).ceil().max(least), a[c].max(b[c]).floor().min(most));
+    for (c, most) in most.into_iter().enumerate() {
+        let (first, last) = (a[c].min(b[c]).ceil().max(0.0), a[c].max(b[c]).floor().min(most));
         let lines = (0..).map(|k| first + f64::from(k)).take_while(|line| *line <= last);
         cuts.extend(lines.map(|line| (line - a[c]) / (b[c] - a[c])).filter(|share| share.is_finite()));
     }
@@ -187,18 +168,19 @@ mod tests {
 
     #[test]
     fn lines_run_through_the_squares_that_they_cross() {
-        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
-        let along = |a: [f64; 2], b: [f64; 2]| squares_along([a, b].map(Vector2::from), free);
+        let along = |a: [f64; 2], b: [f64; 2]| squares_along([a, b].map(Vector2::from), [4.0, 4.0]);
         assert_eq!(along([0.2, 0.1], [0.7, 0.9]), [[0, 0]]);
-        assert_eq!(along([-0.5, 0.25], [2.5, 1.5]), [[-1, 0], [0, 0], [1, 0], [1, 1], [2, 1]]);
-        assert_eq!(along([1.0, -1.5], [1.0, 1.5]), [[1, -2], [1, -1], [1, 0], [1, 1]]);
+        assert_eq!(along([0.5, 0.25], [3.5, 1.5]), [[0, 0], [1, 0], [2, 0], [2, 1], [3, 1]]);
+        assert_eq!(along([1.0, 0.5], [1.0, 3.5]), [[1, 0], [1, 1], [1, 2], [1, 3]]);
         assert_eq!(along([0.3, 0.3], [0.3, 0.3]), [[0, 0]]);
-        // Every place of a line lies in one of them.
-        let (a, b) = (Vector2::new(-3.31, 7.92), Vector2::new(11.4, -2.77));
-        let squares = squares_along([a, b], free);
+        // Every place of a line within the range lies in one of them.
+        let (a, b, most) = (Vector2::new(-3.31, 7.92), Vector2::new(11.4, -2.77), [9.0, 6.0]);
+        let squares = squares_along([a, b], most);
         for k in 0..=10_000 {
             let place = a + (b - a) * (f64::from(k) * 1e-4);
-            assert!(squares.contains(&[place.x.floor() as i64, place.y.floor() as i64]), "{place}");
+            let is_within = (0..2).all(|c| (0.0..most[c]).contains(&place[c]));
+            let square = [place.x.floor() as i64, place.y.floor() as i64];
+            assert!(!is_within || squares.contains(&square), "{place}");
         }
     }
 

@@ -36,8 +36,8 @@ fn a_finish_begins_with_what_roughing_left() {
     let [rough, finish, alone] = [0, 1, 2].map(|k| &report["toolpaths"][k]);
     // What roughing leaves is the finish's to take, and said to be; both together take what the finish takes alone.
     assert!(number(rough, "/excess/max_mm") > 0.17, "{}", rough["excess"]);
-    assert!(rough["notes"].to_string().contains("judged behind finish"), "{}", rough["notes"]);
-    assert!(!finish["notes"].to_string().contains("judged behind"), "{}", finish["notes"]);
+    assert!(rough["notes"].to_string().contains("judged after finish"), "{}", rough["notes"]);
+    assert!(!finish["notes"].to_string().contains("judged after"), "{}", finish["notes"]);
     let volume = |toolpath: &Value| number(toolpath, "/removal/volume_mm3");
     assert!(volume(finish) < 0.1 * volume(rough), "{} {}", volume(finish), volume(rough));
     let both = volume(rough) + volume(finish);

@@ -71,7 +71,7 @@ pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, Pla
     let level = level / (level + served).max(f64::MIN_POSITIVE);
     if places.is_empty() {
         let reason = "what the cutter reaches of it is level or upright, so that there are no contours; zigzag suits level ground, \
-                      and upright walls are those of pockets";
+                      and upright walls can be cut as those of a pocket";
         return Err(refused(reason));
     }
     let mut notes = Vec::new();
