@@ -1,7 +1,7 @@
 //! Proof that moves stay out of what stands when they come, for upright tools.
 //!
-//! Enters: the stock, cutters, a path, and which of its moves are asked for. Leaves: the first of them that is not shown to
-//! stay out, and whether it certainly meets stock; mm.
+//! Enters: the stock, cutters, a path, and which of its moves are asked for. Leaves: the first of them that certainly meets
+//! stock, or else that is not shown to stay out; mm.
 //!
 //! A square of the plan holds nothing that a move meets where the cutter passes over the stock's greatest height there, or
 //! where an earlier move leaves no more: what a move sweeps is a convex function of x and y, so no higher in a rectangle than
@@ -213,7 +213,8 @@ impl Body {
     }
 }
 
-/// The first of the moves that are asked for that is not shown to stay out of what stands when it comes; `None` where all do.
+/// The first of the moves that are asked for that certainly is in what stands when it comes, or else the first that is not
+/// shown to stay out; `None` where all do.
 /// What cut `before` the path has its cutters beside it.
 ///
 /// # Errors
@@ -247,16 +248,20 @@ pub fn first_in_stock(
     let grid = Grid { origin, cell: bin, nx, ny };
     let before = before.iter().map(|(cutter, path)| Cuts::new(&cutter.into(), path, &grid)).collect();
     let search = Search { stock, grid, before, own: Cuts::new(cutters, path, &grid), path, strays, monitor };
+    let mut unsure = None;
     for batch in open.chunks(BATCH) {
         let found = parallel::try_map(batch.len(), |k| {
             let kept = asked(batch[k]).unwrap_or(KeptOut::Cutter);
             search.of_move(batch[k], kept)
         })?;
-        if let Some(first) = found.into_iter().flatten().next() {
-            return Ok(Some(first));
+        for found in found.into_iter().flatten() {
+            if found.depth.is_some() {
+                return Ok(Some(found));
+            }
+            unsure = unsure.or(Some(found));
         }
     }
-    Ok(None)
+    Ok(unsure)
 }
 
 fn raised(kept: KeptOut) -> f64 {

@@ -20,6 +20,7 @@ mod divide;
 mod engine;
 mod error;
 mod groups;
+mod kept_out;
 mod leaf;
 mod line;
 mod moves;

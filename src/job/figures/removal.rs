@@ -39,11 +39,13 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
             let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
             let mut figures = removal_figures(run.path(), &removed, &cut.height, run.session.top());
             if figures.rapid_contacts.is_empty() {
-                unseen = rapid_unseen(run, &mut figures, monitor)?;
+                let rapid =
+                    |k: usize| (run.path().moves[k].kind == MoveKind::Rapid).then_some(KeptOut::Cutter);
+                unseen = first_in_stock(run, rapid, monitor)?.and_then(|found| listed(found, &mut figures));
             }
             (figures, removed.moves)
         }
-        View::Normals(_) => by_voxels(run, monitor)?,
+        View::Normals(_) => by_voxels(run, &mut unseen, monitor)?,
     };
     for contact in &mut r.rapid_contacts {
         contact.line = run.line(contact.move_index);
@@ -113,19 +115,13 @@ pub(super) fn first_in_stock(
     Ok(sim::first_in_stock(&stock, &run.before(), cutters, path, strays, asked, monitor)?)
 }
 
-/// A rapid move in stock that stands between the centres of cells: listed where it is certain, and else returned.
-fn rapid_unseen(
-    run: &Run<'_>,
-    figures: &mut RemovalFigures,
-    monitor: &dyn Monitor,
-) -> Result<Option<InStock>, JobError> {
-    let rapid = |k: usize| (run.path().moves[k].kind == MoveKind::Rapid).then_some(KeptOut::Cutter);
-    let Some(found) = first_in_stock(run, rapid, monitor)? else { return Ok(None) };
-    let Some(depth_mm) = found.depth else { return Ok(Some(found)) };
+/// Lists a rapid move in stock that the centres of cells do not show, where it is certain; else hands it back.
+fn listed(found: InStock, figures: &mut RemovalFigures) -> Option<InStock> {
+    let Some(depth_mm) = found.depth else { return Some(found) };
     let (move_index, at_mm) = (found.move_index, found.at.into());
     figures.rapid_contacts = vec![RapidContactFigures { move_index, line: 0, tool: None, at_mm, depth_mm }];
     figures.rapid_contact_count = 1;
-    Ok(None)
+    None
 }
 
 /// That a rapid move may touch stock.
@@ -146,13 +142,23 @@ fn voxel_in_order(run: &Run<'_>, stock: &Stock) -> f64 {
     run.scene().simulation.voxel.unwrap_or_else(about)
 }
 
-fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<(RemovalFigures, Vec<MoveRemoval>), JobError> {
+/// By voxels; `unseen` is a rapid move that they do not show and that may be in stock.
+fn by_voxels(
+    run: &Run<'_>,
+    unseen: &mut Option<InStock>,
+    monitor: &dyn Monitor,
+) -> Result<(RemovalFigures, Vec<MoveRemoval>), JobError> {
     let (scene, stock) = (run.scene(), run.session.roughed_stock());
     let voxel = voxel_in_order(run, &stock);
     let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
     let engine = VoxelEngine::new(&stock, &cutter, run.path()).map_err(run.voxels())?;
     let removed = engine.removal(voxel, monitor).map_err(run.voxels())?;
-    Ok((voxel_removal_figures(run.path(), &removed, voxel), removed.moves))
+    let mut figures = voxel_removal_figures(run.path(), &removed, voxel);
+    if figures.rapid_contacts.is_empty() {
+        let strays = run.path().origin.strays;
+        *unseen = engine.first_rapid_in_stock(strays, monitor)?.and_then(|found| listed(found, &mut figures));
+    }
+    Ok((figures, removed.moves))
 }
 
 /// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks the cutter.

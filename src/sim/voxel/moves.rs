@@ -214,6 +214,55 @@ impl MotionParts {
         t
     }
 
+    /// Whether the tool is one convex piece that is nowhere wider than at its top: drawn out along its axis it comes to no
+    /// new place below where its top was.
+    pub(super) fn is_widest_on_top(&self) -> bool {
+        let (radius, [_, top]) = (self.solid.radius(), self.solid.heights());
+        self.solid.is_convex() && self.solid.outline_foot(radius, top).distance.abs() < EXACT
+    }
+
+    /// Whether a tool that is nowhere wider than at its top comes on `later`, on which it does not turn, to no new place within
+    /// `reach` of `q`: where it goes, it has been on `earlier`, no higher along its axis, give or take `near` mm. Of a part
+    /// that turns its ends count.
+    pub(super) fn has_been(
+        &self,
+        earlier: &MotionPart,
+        later: &MotionPart,
+        near: f64,
+        q: &Point3,
+        reach: f64,
+    ) -> bool {
+        let (top, goes) = (self.solid.heights()[1], &later.plain);
+        let covers = |was: &StandIn| {
+            // What the axes differ by shows most at the top.
+            let lean = (was.axis - goes.axis).norm() * (top + goes.pivot);
+            [goes.start, goes.start + goes.way].iter().all(|place| {
+                let away = place - was.start;
+                let abeam = (away.dot(&was.across) * was.per_across).clamp(0.0, 1.0);
+                // Straight along the axis the lowest place counts, and only rounding tells which is abeam.
+                let lowest = if was.rise < 0.0 { 1.0 } else { 0.0 };
+                [abeam, lowest].iter().any(|t| {
+                    let beside = away - was.way * *t;
+                    let higher = beside.dot(&was.axis);
+                    let height = (q - was.start - was.way * *t).dot(&was.axis) + was.pivot;
+                    higher >= -near
+                        && (beside - was.axis * higher).norm() + lean <= near
+                        && height + reach <= top
+                })
+            })
+        };
+        let standing = |t: f64| {
+            let at = self.motions[earlier.index as usize].at(t);
+            StandIn::new(at.tip + at.axis * goes.pivot, Vector3::zeros(), at.axis, goes.pivot)
+        };
+        later.half_turn == 0.0
+            && if earlier.half_turn == 0.0 {
+                covers(&earlier.plain)
+            } else {
+                earlier.range.iter().any(|&t| covers(&standing(t)))
+            }
+    }
+
     /// Outward normal of the tool on a move at time `t`, at the place nearest to `q`.
     pub(super) fn normal(&self, index: u32, q: &Point3, t: f64) -> Vector3 {
         let pose = self.motions[index as usize].at(t);

@@ -1,6 +1,7 @@
 //! Voxels against closed forms, brute force, and the engines for upright tools.
 
 mod heights;
+mod kept_out;
 mod mesh;
 mod removal;
 mod standing;
