@@ -9,6 +9,9 @@ use geometry::{Vector2, Vector3};
 /// flat on slopes where only the rim can touch.
 const NEARLY_LEVEL: f64 = 0.05;
 
+/// The least slope that is told from level ground.
+const LEAST_LEVEL: f64 = 1e-6;
+
 /// Slope (sine) below which ground counts as level: there the direction of the slope is rounding.
 const LEVEL: f64 = 1e-9;
 
@@ -61,15 +64,21 @@ impl Cutter {
     /// as steep as the bottom any place of the bottom touches; the offset then grows with the slope, so
     /// that it never jumps.
     pub fn axis_offset(&self, n: &Vector3) -> Vector2 {
+        self.axis_offset_from(n, NEARLY_LEVEL)
+    }
+
+    /// As [`Cutter::axis_offset`] where ground counts as nearly level below the slope (sine) `level`, within what it takes there.
+    pub fn axis_offset_from(&self, n: &Vector3, level: f64) -> Vector2 {
+        let level = level.clamp(LEAST_LEVEL, NEARLY_LEVEL);
         let (plan, profile) = (n.xy(), self.profile());
         let slope = plan.norm();
         if profile.bottom.sin == 0.0 && !profile.bottom_edge && !profile.side_edge {
             // Disc and arc as a sum of two terms, which stays exact on level ground.
             let beyond = slope.min(profile.side.sin).min(1.0);
             let arc = if beyond < slope { beyond / slope } else { 1.0 };
-            return plan * (profile.corner * arc + profile.bottom_end / slope.max(NEARLY_LEVEL));
+            return plan * (profile.corner * arc + profile.bottom_end / slope.max(level));
         }
-        let over = ((slope - profile.bottom.sin) / NEARLY_LEVEL).clamp(0.0, 1.0);
+        let over = ((slope - profile.bottom.sin) / level).clamp(0.0, 1.0);
         if over == 0.0 {
             return Vector2::zeros();
         }

@@ -114,6 +114,8 @@ struct Standing {
     above: Vec<(Point3, f64)>,
     /// How deep it cuts below the design for certain, mm; 0 while only ridges are measured.
     depth: f64,
+    /// How high stands for certain what it does not reach, mm; 0 while only ridges are measured.
+    unreached: f64,
 }
 
 impl Standing {
@@ -134,7 +136,7 @@ impl Standing {
         let places = map.above.iter().map(|place| (place.at, place.height));
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
-        let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0 };
+        let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0, unreached: 0.0 };
         Some(standing.on_faces(&planned.plan.kept.faces, wanted))
     }
 
@@ -164,7 +166,8 @@ impl Standing {
         let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
         let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
-        Self { round, above, depth }.on_faces(&planned.plan.kept.faces, wanted)
+        let unreached = measured.excess.unreached.at_least_mm;
+        Self { round, above, depth, unreached }.on_faces(&planned.plan.kept.faces, wanted)
     }
 
     /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once those are cut.
@@ -498,13 +501,14 @@ impl Corrected<'_> {
                     monitor,
                 )?;
                 let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
-                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that cuts too deep.
-                let gouge = self.session.scene.tolerance.gouge;
-                let is_deeper = found.depth > gouge && self.tried.standing.depth <= gouge;
+                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that cuts too deep or leaves more uncut.
+                let (limits, best) = (&self.session.scene.tolerance, &self.tried.standing);
+                let is_deeper = found.depth > limits.gouge && best.depth <= limits.gouge;
+                let leaves_more = found.unreached > limits.uncut && best.unreached <= limits.uncut;
                 gain = match (is_passing, self.session.passes(&again)) {
                     (false, true) => self.keep(planned, next, found),
                     (true, false) => self.keep_best(&planned, next, found),
-                    _ if is_deeper => self.keep_best(&planned, next, found),
+                    _ if is_deeper || leaves_more => self.keep_best(&planned, next, found),
                     _ => self.keep_if_better(planned, next, found),
                 };
                 if gain != Gain::None {
@@ -816,14 +820,14 @@ impl Corrected<'_> {
 
     /// What the best plan leaves, as that of another with other ends of passes.
     fn as_before(&self, planned: &Planned, factors: [f64; 2]) -> Standing {
-        let Standing { round, above, depth } = &self.tried.standing;
+        let Standing { round, above, depth, unreached } = &self.tried.standing;
         let round = CorrectionRound {
             factors,
             cutting_length_mm: cutting_length(planned),
             too_near_between_mm: too_near(planned),
             ..*round
         };
-        Standing { round, above: above.clone(), depth: *depth }
+        Standing { round, above: above.clone(), depth: *depth, unreached: *unreached }
     }
 
     /// Keeps the best plan instead of this one.

@@ -24,12 +24,12 @@ use super::silhouette::{Over, Silhouette};
 use cutter::Cutter;
 use geometry::Vector3;
 
-/// The strip is never planned wider than this multiple of the strip on a plane. Where the surface
+/// The strip is never planned wider than this multiple of the strip on a plane, of the cutter or of a ball as wide. Where the surface
 /// is nearly as concave as the cutter the width grows without bound, and with it the part of the surface over which its
 /// curvature would have to stay the same.
 const WIDEST_OVER_PLANE: f64 = 2.5;
 
-/// Widest share of the cutter's diameter that a strip may take (flat ends on flat ground).
+/// Widest share of the cutter's diameter that a strip is planned by (flat ends on flat ground).
 const WIDEST_OVER_DIAMETER: f64 = 0.8;
 
 /// A surface counts as nearly as concave as the cutter where this share of the cutter's curvature, or
@@ -122,25 +122,58 @@ pub fn strip_width_at(
     surface: &FeedCurvature,
     h: f64,
 ) -> (f64, bool) {
+    width_within(WIDEST_OVER_DIAMETER * 2.0 * cutter.radius(), cutter, n, b, surface, h)
+}
+
+/// As [`strip_width_at`], also where flat ends on flat ground leave nothing until their strips part: no path has a wider one.
+pub fn widest_strip_at(
+    cutter: &Cutter,
+    n: &Vector3,
+    b: &Vector3,
+    surface: &FeedCurvature,
+    h: f64,
+) -> (f64, bool) {
+    width_within(2.0 * cutter.radius(), cutter, n, b, surface, h)
+}
+
+/// [`strip_width_at`], `most` mm at most.
+fn width_within(
+    most: f64,
+    cutter: &Cutter,
+    n: &Vector3,
+    b: &Vector3,
+    surface: &FeedCurvature,
+    h: f64,
+) -> (f64, bool) {
     let bend = bend_of(cutter, n, b);
     // An edge shows no meridian to compare.
     let surface = if cutter.touches_with_edge(n) { surface.across } else { untwisted(&bend, surface) };
     if cutter.is_ball() {
         return strip_width(1.0 / cutter.radius(), surface, h, cutter.radius());
     }
-    let widest = widest(h, cutter.radius());
+    let outline = Silhouette::new(cutter, *n, *b);
+    let of_ball = widest(h, cutter.radius()).min(most);
+    let widest = || {
+        let on_plane = outline.width(&Over { curvature: 0.0, height: h, farthest: most });
+        if on_plane.is_nan() { of_ball } else { (WIDEST_OVER_PLANE * on_plane).clamp(of_ball, most) }
+    };
     // A point has no curvature to compare: it leaves grooves.
     let curvature = bend.across;
     let too_concave = curvature.is_finite() && too_concave(curvature, surface);
     if surface > 0.0 && curvature <= surface && !cutter.touches_with_edge(n) {
-        return (widest, too_concave);
+        // A flat end stands over a hollow by its sides.
+        let (widest, over_hollow) = (widest(), (8.0 * h / (surface - curvature)).sqrt());
+        return (widest.min(over_hollow).max(of_ball), too_concave && over_hollow < widest);
     }
-    let over = Over { curvature: surface, height: h, farthest: widest };
-    let width = Silhouette::new(cutter, *n, *b).width(&over);
+    let width = outline.width(&Over { curvature: surface, height: h, farthest: most });
     if width.is_nan() || width <= 0.0 {
         // Over twisted ground the outline may turn back: the circle that osculates the cutter tells more.
         return strip_width(curvature, surface, h, cutter.radius());
     }
+    if width < of_ball {
+        return (width, false);
+    }
+    let widest = widest();
     if width < widest { (width, false) } else { (widest, too_concave) }
 }
 
@@ -258,6 +291,19 @@ mod tests {
         }
         assert!(strip_width(0.2, 0.25, 0.01, 5.0).1, "concave beyond the ball: limited, and said so");
         assert!(!strip_width(0.0, 0.0, 0.01, 5.0).1, "a flat end on a plane is limited, but not by the part");
+        // On level ground flats part where their strips do; on a slope of one degree the rim is an arc of r/sin 1°.
+        let (flat, bull, h) = (Cutter::flat(20.0).unwrap(), Cutter::bull(20.0, 2.0).unwrap(), 0.01);
+        let [level, slope] = [0.0f64, 1.0]
+            .map(|degrees| Vector3::new(-degrees.to_radians().sin(), 0.0, degrees.to_radians().cos()));
+        let of = |width: fn(&Cutter, &Vector3, &Vector3, &FeedCurvature, f64) -> (f64, bool), cutter, n| {
+            width(cutter, n, &Vector3::y(), &across(0.0), h).0
+        };
+        assert_eq!([&flat, &bull].map(|cutter| of(strip_width_at, cutter, &level)), [16.0; 2]);
+        assert!((of(widest_strip_at, &flat, &level) - 20.0).abs() < 1e-9);
+        let on_plane = 16.0 + 2.0 * (2.0 * 2.0 * h - h * h).sqrt();
+        assert!((of(widest_strip_at, &bull, &level) - on_plane).abs() < 1e-9);
+        let chord = 2.0 * (100.0 - (10.0 - h / 1f64.to_radians().sin()).powi(2)).sqrt();
+        assert!((of(strip_width_at, &flat, &slope) / chord - 1.0).abs() < 1e-3);
         let thin = strip_width(1.0 / 3.0, -300.0, 1.0, 3.0).0;
         assert!(thin > 0.0 && ball_scallop_height(3.0, -300.0, thin).unwrap() < 1.0, "a wire");
     }
@@ -365,7 +411,7 @@ mod tests {
                 let hull = outline(cutter, &n, &b);
                 for (kappa, h) in [(0.0, 0.01), (0.0, 0.1), (-0.03, 0.05), (0.01, 0.05)] {
                     let (width, limited) = strip_width_at(cutter, &n, &b, &across(kappa), h);
-                    if limited || width >= widest(h, cutter.radius()) {
+                    if limited || width >= WIDEST_OVER_DIAMETER * 2.0 * cutter.radius() {
                         continue;
                     }
                     let real = ridge(&hull, width, kappa);
@@ -393,8 +439,8 @@ mod tests {
                 for bend in [-0.12, 0.0, 0.05, 0.12] {
                     let [a, b] =
                         [&taper, &bull].map(|cutter| strip_width_at(cutter, &n, &b, &across(bend), h).0);
-                    // The wider cutter's strips are limited later.
-                    let a = a.min(widest(h, bull.radius()));
+                    // In hollows the wider cutter's strips are limited later.
+                    let [a, b] = [a, b].map(|width| width.min(widest(h, bull.radius())));
                     assert!((a / b - 1.0).abs() < 1e-9, "{h} {n:?} {bend}: {a} {b}");
                 }
             }

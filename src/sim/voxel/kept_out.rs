@@ -39,6 +39,9 @@ enum Seen {
     Divided(Vec<u32>, Vec<u32>),
 }
 
+/// A part of a rapid move, and a place.
+type Found = (u32, Point3);
+
 /// Upper bounds on a depth at the corners of a cube.
 type Corners = [f64; 8];
 
@@ -72,12 +75,11 @@ impl VoxelEngine<'_> {
             parts: all.collect(),
             asked,
         }];
-        let (mut met, mut open): (Option<(u32, Point3)>, Option<(u32, Point3)>) = (None, None);
-        let earlier =
-            |a: Option<(u32, Point3)>, b: (u32, Point3)| Some(a.filter(|a| a.0 <= b.0).unwrap_or(b));
+        let (mut met, mut open) = (None, None);
+        let earlier = |a: Option<Found>, b: Found| Some(a.filter(|a| a.0 <= b.0).unwrap_or(b));
         while !level.is_empty() {
             check(monitor)?;
-            let known = met.map_or(u32::MAX, |(part, _)| part);
+            let known = met.map_or(u32::MAX, |(part, _): Found| part);
             let seen = parallel::try_map(level.len(), |k| {
                 check(monitor)?;
                 Ok(self.rapids_in(&level[k], strays, known))

@@ -9,7 +9,7 @@ use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::spacing::{LevelSteps, level_tangent, place_levels, places_of};
 use super::{gaps, planned_field};
 use crate::moves::touch::Touch;
-use crate::surface::chart::Chart;
+use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
 use crate::vocabulary::{
     Contact, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task,
@@ -17,7 +17,7 @@ use crate::vocabulary::{
 use cutter::Cutter;
 use drop_cutter::{Beside, DropCutter};
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
-use geometry::Point3;
+use geometry::{Point3, Vector2, Vector3};
 use motion::CcPoint;
 use work::monitor::{Cancelled, Monitor};
 
@@ -122,6 +122,9 @@ fn passes_along(
     Ok(passes)
 }
 
+/// A rim that lies beside the border by no more than this share of its radius touches it.
+const HAIR: f64 = 1e-5;
+
 /// How far beyond the chart passes are traced, in parameters: the width over which a pass outside
 /// the border still serves the strip inside it.
 fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassSettings) -> [f64; 2] {
@@ -158,8 +161,17 @@ impl ChartGuide<'_> {
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2], beside: &mut Beside) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let axis = p.jet.p.xy() + self.dropped.axis_offset(&p.normal);
-        self.drop.at_beside(axis.x, axis.y, beside).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
+        let axis = self.axis_over(&p);
+        let mut dropped = |axis: Vector2| {
+            self.drop.at_beside(axis.x, axis.y, beside).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
+        };
+        // The rim of a disc on the border lies beside it by rounding.
+        let contact = p.jet.p.coords.xy();
+        dropped(axis).or_else(|| dropped(contact + (axis - contact) * (1.0 - HAIR)))
+    }
+
+    fn axis_over(&self, p: &ChartPoint) -> Vector2 {
+        self.chart.axis_over(p, self.dropped, self.settings.chord_tolerance)
     }
 
     /// The stretches of a curve inside and outside of the chart, in order.
@@ -199,7 +211,10 @@ impl ChartGuide<'_> {
         let useful = |from: f64, to: f64| {
             let steps = ((to - from).abs() / OVERRUN_STEP).ceil().max(1.0) as usize;
             let place = |k: usize| from + (to - from) * k as f64 / steps as f64;
-            place((1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps))
+            let end = (1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps);
+            // A disc over no part of it does not stand on the chart.
+            let stands = |k: &usize| self.tip(at(place(*k)), &mut Beside::default()).is_some();
+            place((1..=end).rev().find(stands).unwrap_or(0))
         };
         if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
             first.from = useful(first.to, first.from);
@@ -242,12 +257,21 @@ impl ChartGuide<'_> {
             let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
             let feed = (here.jet.du * du + here.jet.dv * dv).try_normalize(1e-300)?;
             let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            let (du, dv) = here.jet.pull_back(&here.cut_across(self.cutter, &feed))?;
-            Some([0.5 * interval * du, 0.5 * interval * dv])
+            let across = here.cut_across(self.cutter, &feed) * (0.5 * interval);
+            // The rim of a flat runs back from its foremost place toward the axis.
+            let offset = self.axis_over(&here) - here.jet.p.coords.xy();
+            let (arm, half) = (offset.norm(), 0.5 * interval);
+            let back = if self.dropped.flat_radius() > 0.0 && arm > 0.0 {
+                arm - (arm * arm - half * half).max(0.0).sqrt()
+            } else {
+                0.0
+            };
+            let toward = here.tangent_at(offset.y.atan2(offset.x)).map_or_else(Vector3::zeros, |t| t * back);
+            Some([across, -across].map(|aside| here.jet.pull_back(&(aside + toward))))
         };
-        beside().is_some_and(|[du, dv]| {
-            self.chart.holds([p[0] + du, p[1] + dv]) || self.chart.holds([p[0] - du, p[1] - dv])
-        })
+        let holds =
+            |way: Option<(f64, f64)>| way.is_some_and(|(du, dv)| self.chart.holds([p[0] + du, p[1] + dv]));
+        beside().is_some_and(|ways| ways.into_iter().any(holds))
     }
 }
 

@@ -64,7 +64,7 @@ fn on_chart(task: &Task<'_>, chart: &Chart) -> Result<Passes, PlanError> {
     let drop = DropCutter::watched(part, dropped, monitor)?;
     let tip = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;
-        let axis = p.jet.p.xy() + dropped.axis_offset(&p.normal);
+        let axis = chart.axis_over(&p, dropped, settings.chord_tolerance);
         drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     };
     let moves = |points: &[[f64; 2]]| -> Result<Vec<Point3>, Cancelled> {

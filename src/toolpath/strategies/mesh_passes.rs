@@ -26,7 +26,7 @@ use field::mesh::{Bend, FieldMesh, Held, Line, MeshCurve, MeshPoint, Sense, Want
 use field::{DIRECTION_WEIGHT, Packed};
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::Part;
-use scallop::{FeedCurvature, strip_width_at};
+use scallop::{FeedCurvature, strip_width, strip_width_at, widest_strip_at};
 use work::monitor::{Cancelled, Monitor};
 
 /// Two places of the axis nearer than this, mm, are one: rounding.
@@ -73,9 +73,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let flat = match settings.step {
         Step::Stepover(width) => width,
-        Step::Scallop(h) => {
-            strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0
-        }
+        Step::Scallop(h) => level_interval(cutter, h),
     };
     let parameters: Vec<_> = match part.patches() {
         // u and v of a mesh are its x and y.
@@ -256,11 +254,23 @@ fn along_lines(
 pub(crate) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, step: Step) -> (f64, bool) {
     match step {
         Step::Stepover(width) => (width, false),
-        Step::Scallop(h) => {
-            let bends = FeedCurvature::of(&b.cross(n), b, |d| bend.along(d));
-            strip_width_at(cutter, n, b, &bends, h)
-        }
+        Step::Scallop(h) => strip_width_at(cutter, n, b, &bends_across(n, b, bend), h),
     }
+}
+
+/// Wider than any path's strip across the feed, as [`width_at`].
+pub(crate) fn widest_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, h: f64) -> (f64, bool) {
+    widest_strip_at(cutter, n, b, &bends_across(n, b, bend), h)
+}
+
+fn bends_across(n: &Vector3, b: &Vector3, bend: &Bend) -> FeedCurvature {
+    FeedCurvature::of(&b.cross(n), b, |d| bend.along(d))
+}
+
+/// The distance of passes on level ground that a mesh is made ready for, mm: a flat end may take more where that goes on.
+pub(crate) fn level_interval(cutter: &Cutter, h: f64) -> f64 {
+    let strip = strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0;
+    strip.min(strip_width(0.0, 0.0, h, cutter.radius()).0)
 }
 
 /// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of

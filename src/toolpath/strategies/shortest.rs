@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use super::direction_keys;
 use super::iso_scallop::{border_name, fronts, places};
-use super::mesh_passes::{self, Aim, width_at};
+use super::mesh_passes::{self, Aim, level_interval, widest_at};
 use super::stream_search::{Found, Prices, Search};
 use crate::levels::level_passes::along_levelled;
 use crate::levels::{obedience, planned_field, spirals};
@@ -33,14 +33,13 @@ use crate::surface::feed;
 use crate::surface::mesh_surface::{reachable, wants_mesh};
 use crate::vocabulary::{
     COMPARED_CHORDS, Definition, FeedDirection, LevelFunction, Levelled, Links, PassSettings, Passes,
-    PlanError, Step, Strategy, Task,
+    PlanError, Strategy, Task,
 };
 use cutter::Cutter;
 use field::ShortestPossible;
 use geometry::Vector3;
 use keys::{toml_number, word_of};
 use part::Part;
-use scallop::{FeedCurvature, strip_width_at};
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
@@ -70,17 +69,15 @@ pub fn shortest_possible(
     h: f64,
     monitor: &dyn Monitor,
 ) -> Result<ShortestPossible, PlanError> {
-    let step = Step::Scallop(h);
     let mut all: Vec<Least> = Vec::new();
     if part.patches().is_empty() && wants_mesh(part, cutter) {
-        let flat = strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0;
-        for piece in reachable(part, cutter, flat)?.pieces {
+        for piece in reachable(part, cutter, level_interval(cutter, h))?.pieces {
             let mesh = &piece.mesh;
             let of_facet = |t: usize| {
                 monitor::check(monitor)?;
                 let Some((normal, bend)) = piece.facet(t) else { return Ok(None) };
                 let ratio = |t: &Vector3| (1.0 - bend.along(t) * cutter.corner_radius()).max(0.0);
-                let width = |t: &Vector3| width_at(cutter, &normal, &normal.cross(t), &bend, step);
+                let width = |t: &Vector3| widest_at(cutter, &normal, &normal.cross(t), &bend, h);
                 let [a, b, _] = mesh.corners(t);
                 Ok::<_, Cancelled>(Least::of(mesh.area(t), &(b - a), &normal, ratio, width))
             };
@@ -99,7 +96,7 @@ pub fn shortest_possible(
                 let (e, f, g) = p.jet.first_form();
                 let area = cell * (e * g - f * f).max(0.0).sqrt();
                 let ratio = |t: &Vector3| p.offset_ratio(cutter, t);
-                let width = |t: &Vector3| p.strip_width(cutter, t, step);
+                let width = |t: &Vector3| p.widest_strip(cutter, t, h);
                 Ok::<_, Cancelled>(Least::of(area, &p.jet.du, &p.normal, ratio, width))
             };
             all.extend(parallel::try_map(places.len(), at)?.into_iter().flatten());

@@ -81,7 +81,8 @@ fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
     let dropped = task.dropped();
-    let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, dropped, &e));
+    let [x, y] = [Vector2::x(), Vector2::y()]
+        .map(|e| Chart::extent_of_axes(&charts, part, dropped, settings.chord_tolerance, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
     let reach = 0.5 * (x[1] - x[0]).hypot(y[1] - y[0]);
     let mut notes = Vec::new();

@@ -130,7 +130,7 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
         }
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
-    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, e);
+    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, settings.chord_tolerance, e);
     let (from_to, sides) = (extent(&along), extent(&across));
     let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
     // A stepover that the user asked for is kept exactly, and the passes stand in the middle.

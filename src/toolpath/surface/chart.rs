@@ -15,7 +15,7 @@ use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use motion::{CcPoint, in_tool_frame};
 use part::Part;
-use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at};
+use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at, widest_strip_at};
 
 /// Control points of a height surface lie so many facets apart, and no less and no more than these shares of the cutter's
 /// radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so that meshes that have any take
@@ -43,6 +43,11 @@ const SMOOTHNESS: f64 = 1e-6;
 
 /// Rounds in which an interval and the curvature over it are made to agree.
 const INTERVAL_ROUNDS: usize = 2;
+
+/// Where the slope turns, the axis of a cutter with a flat gets ahead of its contact by no more than so many times the way of that
+/// over a crest, and falls behind by no more than this share of it in a hollow.
+const MOST_AHEAD: f64 = 2.0;
+const MOST_BEHIND: f64 = 0.5;
 
 /// An interval is no less than this share of what its middle allows: at sharper edges further passes are put in.
 const LEAST_INTERVAL: f64 = 0.25;
@@ -201,6 +206,13 @@ impl ChartPoint<'_> {
         }
     }
 
+    /// Wider than any path's strip along the unit feed tangent `t` below the scallop height `h`, mm, as
+    /// [`ChartPoint::strip_width`].
+    pub fn widest_strip(&self, cutter: &Cutter, t: &Vector3, h: f64) -> (f64, bool) {
+        let [n, b] = self.across_in_tool_frame(cutter, t);
+        widest_strip_at(cutter, &n, &b, &self.bends(t), h)
+    }
+
     /// Whether a measurement asked for narrower passes here than elsewhere.
     pub fn was_narrowed(&self) -> bool {
         self.guide.correction.is_some_and(|correction| correction.is_narrower_at(&self.jet.p))
@@ -296,6 +308,19 @@ impl<'a> Chart<'a> {
         (width, limited)
     }
 
+    /// Where the axis of an upright cutter stands, in the plan view, that touches a place. Its flat reaches over nearly level ground
+    /// as far as it does on a plane, but where the slope turns so fast that the axis would swerve or turn back; `chord` mm are no
+    /// matter.
+    pub fn axis_over(&self, p: &ChartPoint, cutter: &Cutter, chord: f64) -> Vector2 {
+        let flat = cutter.flat_radius();
+        let place = p.jet.p.coords.xy();
+        let down = slope_at(&p.normal, true).filter(|_| flat > 0.0 && !self.is_fitted());
+        let Some((down, _)) = down else { return place + cutter.axis_offset(&p.normal) };
+        let bend = p.curvature_along(&down);
+        let turns = flat * if bend > 0.0 { bend / MOST_BEHIND } else { -bend / MOST_AHEAD };
+        place + cutter.axis_offset_from(&p.normal, turns.max(0.5 * chord / flat))
+    }
+
     /// Whether it was fitted to a mesh, on which it does not lie.
     pub fn is_fitted(&self) -> bool {
         matches!(self.source, Source::Heights(_))
@@ -372,18 +397,24 @@ impl<'a> Chart<'a> {
     /// Least and greatest `x·e` over the plan views of all places where the cutter's axis can be when
     /// the cutter touches one of the charts. On a mesh the triangles themselves answer:
     /// the fitted surface has no creases.
-    pub fn extent_of_axes(charts: &[Self], part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
-        let all = charts.iter().map(|chart| chart.extent_of_own_axes(part, cutter, e));
+    pub fn extent_of_axes(
+        charts: &[Self],
+        part: &Part,
+        cutter: &Cutter,
+        chord: f64,
+        e: &Vector2,
+    ) -> [f64; 2] {
+        let all = charts.iter().map(|chart| chart.extent_of_own_axes(part, cutter, chord, e));
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
-    fn extent_of_own_axes(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+    fn extent_of_own_axes(&self, part: &Part, cutter: &Cutter, chord: f64, e: &Vector2) -> [f64; 2] {
         const N: usize = 200;
         let [[u0, u1], [v0, v1]] = self.domain;
         let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut include = |p: &Point3, n: &Vector3| {
-            let x = (p.coords.xy() + cutter.axis_offset(n)).dot(e);
+        let mut include = |axis: Vector2| {
+            let x = axis.dot(e);
             extent = [extent[0].min(x), extent[1].max(x)];
         };
         if let Source::Heights(_) = self.source {
@@ -391,14 +422,15 @@ impl<'a> Chart<'a> {
             for t in 0..mesh.triangles().len() {
                 let normal = mesh.normal(t);
                 if normal.z > 0.0 {
-                    mesh.corners(t).iter().for_each(|corner| include(corner, &normal));
+                    let offset = cutter.axis_offset(&normal);
+                    mesh.corners(t).iter().for_each(|corner| include(corner.coords.xy() + offset));
                 }
             }
             return extent;
         }
         for k in 0..(N + 1) * (N + 1) {
             if let Some(p) = self.at(at(u0, u1, k % (N + 1)), at(v0, v1, k / (N + 1))) {
-                include(&p.jet.p, &p.normal);
+                include(self.axis_over(&p, cutter, chord));
             }
         }
         extent
