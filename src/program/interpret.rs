@@ -93,6 +93,8 @@ pub(crate) struct Interpreter<'a> {
     pub shift: usize,
     /// A number without a point was noted.
     noted_increments: bool,
+    /// The unit of the first G20 or G21, mm.
+    unit_said: Option<f64>,
 }
 
 impl<'a> Interpreter<'a> {
@@ -119,6 +121,7 @@ impl<'a> Interpreter<'a> {
             compensation: None,
             shift: 0,
             noted_increments: false,
+            unit_said: None,
         }
     }
 
@@ -317,7 +320,11 @@ impl<'a> Interpreter<'a> {
                     _ => asked.motion = Some((motion, *word)),
                 },
                 Code::Plane(plane) => modal.plane = plane,
-                Code::Units { inch } => modal.unit = if inch { INCH } else { 1.0 },
+                Code::Units { inch } => {
+                    modal.unit = if inch { INCH } else { 1.0 };
+                    let said = *self.unit_said.get_or_insert(modal.unit);
+                    self.out.both_units |= said != modal.unit;
+                }
                 Code::Absolute(absolute) => modal.absolute = absolute,
                 Code::ArcAbsolute(absolute) => modal.arc_absolute = absolute,
                 Code::Feed(mode) => {

@@ -141,7 +141,7 @@ FINI
 #[test]
 fn a_cutter_is_that_of_the_tool_that_moves_next() {
     let text = "CUTTER/10,5\nLOADTL/1\nGOTO/0,0,1\nGOTO/1,0,1\nUNITS/INCHES\nCUTTER/0.25,0,0.125,0,0,0,2\nLOADTL/2\nGOTO/2,0,1\nFINI\n";
-    let tools = crate::ToolTable::of_remarks(&read(text));
+    let tools = crate::Described::of(&read(text)).table;
     let cutter = |tool: u32| tools.get(tool).map(|tool| tool.cutter);
     assert_eq!((cutter(1), cutter(2)), (cutter::Cutter::ball(10.0).ok(), cutter::Cutter::flat(6.35).ok()));
     let twice = read("LOADTL/1\nCUTTER/10,5\nGOTO/0,0,1\nGOTO/1,0,1\nCUTTER/8,4\nGOTO/2,0,1\nFINI\n");
