@@ -219,8 +219,8 @@ fn described(
     bytes: &[u8],
     control: &'static Control,
 ) -> Result<(Described, Vec<u32>), ProgramError> {
-    // The radius of a cutter moves no tool from its place in the list.
-    let setup = Setup { any_radius: Some(0.0), ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+    // Neither the radius of a cutter nor where a work offset is moves a tool from its place in the list.
+    let setup = Setup { any_radius: Some(0.0), offsets_known: true, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
     let read =
         if looks_like_apt(bytes) { read_apt(name, bytes) } else { read_gcode(name, bytes, control, &setup) }?;
     Ok((Described::of(&read), read.tools_that_feed()))

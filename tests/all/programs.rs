@@ -254,7 +254,7 @@ fn faults_are_named_with_their_lines() {
 fn wrong_offsets_and_lengths_show() {
     let mut moved = raster();
     let line = line_of(&moved, "X0.000 Y4.000");
-    moved.insert(line - 1, "G10 L2 P2 X0.5 Y0 Z-200.1\nG55 G1 Z0".to_owned());
+    moved.insert(line - 1, "G91 G10 L2 P2 X0.5 Y0 Z-0.1\nG90 G55 G1 Z0".to_owned());
     assert_violates(&moved, &[], "gouge 100.0");
     let home = tempfile::tempdir().unwrap();
     let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 80\n";
