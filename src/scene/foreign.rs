@@ -77,6 +77,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let described = if table.tools.is_empty() { said.table.clone() } else { table };
     let (mut findings, mut notes) = (read.findings(&length), notes(&read));
     let gauge_lengths = lengths.clone();
+    let straight_rapids = control.straight_rapids.filter(|_| !is_apt);
     let table_zero = kinematics.map_or([0.0; 2], |kinematics| {
         kinematics.axes().map(|axis| match axis.side {
             Side::Head => 0.0,
@@ -97,6 +98,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             path,
             joints,
             table_zero,
+            straight_rapids,
             tools,
             gauge_lengths,
             before,
@@ -116,6 +118,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             path,
             joints,
             table_zero,
+            straight_rapids,
             tools: None,
             gauge_lengths,
             before,

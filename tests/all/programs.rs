@@ -250,6 +250,32 @@ fn faults_are_named_with_their_lines() {
     );
 }
 
+/// Back along a slot: straight it is clear, and at 45 degrees it leads through stock.
+#[test]
+fn a_rapid_that_may_be_bent_into_stock_leaves_the_verdict_open() {
+    let mut program = raster();
+    let start = line_of(&program, "G1 Z0");
+    program.splice(start..start, ["X16. Y4.", "G0 X0. Y0.", "G1"].map(str::to_owned));
+    let (straight, _) = verify(&program, &["--allowance", "1"]);
+    assert_eq!(straight.code, Some(0), "{}{}", straight.stdout, straight.stderr);
+    for (control, setting) in [("haas", "setting 335"), ("fanuc", "parameter 1401")] {
+        let (answer, report) = verify(&program, &["--allowance", "1", "--control", control]);
+        assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+        let report = report.unwrap();
+        assert_eq!(report["verdict"], "undecided", "{}", answer.stdout);
+        let notes = report["toolpaths"][0]["notes"].to_string();
+        let line = format!("first in line {}", start + 2);
+        assert!(notes.contains(setting) && notes.contains(&line), "{notes}");
+        assert!(answer.stdout.contains("with one rate of all axes"), "{}", answer.stdout);
+        // One axis at a time runs straight on every control.
+        let mut clear = program.clone();
+        clear.splice(start + 1..start + 2, ["G0 Z10.", "G0 X0. Y0.", "G1 Z0."].map(str::to_owned));
+        let (answer, report) = verify(&clear, &["--allowance", "1", "--control", control]);
+        assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+        assert!(!report.unwrap()["toolpaths"][0]["notes"].to_string().contains(setting));
+    }
+}
+
 #[test]
 fn wrong_offsets_and_lengths_show() {
     let mut moved = raster();
