@@ -158,22 +158,26 @@ pub(crate) fn number_of_remark(text: &str) -> Option<u32> {
     rest[..end].parse().ok()
 }
 
-/// What stands behind each of some words, where they begin a word.
-fn behind<'a>(upper: &'a str, words: &'a [&str]) -> impl Iterator<Item = &'a str> {
+/// Each of some words where it begins a word, and what stands behind it.
+fn behind<'a>(upper: &'a str, words: &'a [&str]) -> impl Iterator<Item = (&'a str, &'a str)> {
     words.iter().flat_map(move |word| {
         let begins = |at: usize| at == 0 || !upper.as_bytes()[at - 1].is_ascii_alphanumeric();
         let places = upper.match_indices(word).map(|(at, _)| at).filter(move |at| begins(*at));
-        places.map(move |at| upper[at + word.len()..].trim_start())
+        places.map(move |at| (*word, upper[at + word.len()..].trim_start()))
     })
 }
 
 /// The length behind some words, mm; all that stand there have to agree. Else why it is not known.
 fn length_after(upper: &str, words: &[&str], unit: Option<f64>) -> Result<Option<f64>, String> {
     let mut known: Option<f64> = None;
-    for text in behind(upper, words) {
+    for (word, text) in behind(upper, words) {
         let length = plain_length(text, unit).ok_or_else(|| {
             let shown: String = text.split_whitespace().next().unwrap_or_default().chars().take(20).collect();
-            format!("`{}{shown}` is not a plain length", words[0])
+            let why = match plain_length(text, Some(INCH)) {
+                Some(_) => "has no unit, and that of the program does not settle it",
+                None => "is not a plain length",
+            };
+            format!("`{word}{shown}` {why}")
         })?;
         if known.is_some_and(|other| (other - length).abs() > SAME_LENGTH) {
             return Err(format!("it tells several lengths behind `{}`", words.join("` and `")));
