@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cutter::Cutter;
 use keys::{toml_number, toml_string};
-use program::{Tool, ToolTable};
+use program::{Described, Tool, ToolTable};
 use scene::{Scene, TableError, described_tools, scene_table, tool_table};
 use toolpath::ALL_TOOLS;
 use work::monitor;
@@ -21,7 +21,8 @@ use super::run::{Chosen as Simulated, RunOutcome, Target, default_target, on_thr
 /// [`CliError`]; nothing is written then.
 pub fn verify(options: &VerifyOptions, progress: &Progress) -> Result<RunOutcome, CliError> {
     on_threads(options.threads, || {
-        let mut scene = Scene::of_text(&name(&options.program), text(options)?)?;
+        let mut scene = Scene::of_text(&name(&options.program), text(options)?)
+            .map_err(|error| one_of_several(options).unwrap_or_else(|| error.into()))?;
         Simulated { cell: options.cell, memory: options.memory, engine: options.engine }.apply(&mut scene);
         monitor::check(progress)?;
         let target = options.out.clone().unwrap_or_else(|| default_target(&options.program));
@@ -82,27 +83,48 @@ fn refused(what: &str, cure: &str) -> CliError {
     CliError::Verify { what: what.to_owned(), cure: cure.to_owned() }
 }
 
+/// What is wrong with --cutter for a program of several tools.
+fn one_of_several(options: &VerifyOptions) -> Option<CliError> {
+    if options.cutter.is_none() || options.tool.is_some() {
+        return None;
+    }
+    let (_, feeding) = in_program(options).ok()?;
+    let last = feeding.last().filter(|_| feeding.len() > 1)?;
+    let listed = feeding.iter().map(|tool| format!("T{tool}")).collect::<Vec<_>>().join(", ");
+    let what = format!("{} uses several tools ({listed}), and --cutter is one", shown(&options.program));
+    let cure = format!(
+        "name the one that --cutter is, such as --tool {last}, or give all of them by --tools FILE instead of --cutter"
+    );
+    Some(refused(&what, &cure))
+}
+
 /// The cutters that the program itself describes in its comments.
 fn of_program(options: &VerifyOptions) -> Result<Chosen, CliError> {
     let file = shown(&options.program);
-    let cure = "add --cutter or --tools";
-    let (table, feeding) = in_program(options)?;
-    if options.tool.is_none() && several(&table, &feeding) {
-        return all(&table, &feeding).ok_or_else(|| refused(&format!("{file} describes no cutter"), cure));
+    let cure = "give it with --cutter, such as --cutter ball:6, or in a table with --tools";
+    let (described, feeding) = in_program(options)?;
+    let table = &described.table;
+    let because = |what: String, tool: Option<u32>| {
+        described.doubts(tool).fold(what, |what, doubt| what + "; " + doubt)
+    };
+    if options.tool.is_none() && several(table, &feeding) {
+        return all(table, &feeding).ok_or_else(|| refused(&format!("{file} describes no cutter"), cure));
     }
     let known: Vec<u32> = feeding.into_iter().filter(|number| table.get(*number).is_some()).collect();
     let number = match (options.tool, &known[..]) {
         (Some(number), _) => number,
         (None, [only, ..]) => *only,
-        (None, []) => return Err(refused(&format!("{file} describes no cutter"), cure)),
+        (None, []) => return Err(refused(&because(format!("{file} describes no cutter"), None), cure)),
     };
     let tool = table.get(number);
-    tool.map(|tool| one(tool, options.tool))
-        .ok_or_else(|| refused(&format!("{file} describes no cutter for tool {number}"), cure))
+    tool.map(|tool| one(tool, options.tool)).ok_or_else(|| {
+        let what = format!("{file} describes no cutter for tool {number}");
+        refused(&because(what, Some(number)), cure)
+    })
 }
 
-/// The tools that the program describes, and those that feed in it.
-fn in_program(options: &VerifyOptions) -> Result<(ToolTable, Vec<u32>), CliError> {
+/// What the program says of its cutters, and the tools that feed in it.
+fn in_program(options: &VerifyOptions) -> Result<(Described, Vec<u32>), CliError> {
     described_tools(&options.program, &options.control)
         .map_err(|error| unusable(error, &options.program, "name a program"))
 }

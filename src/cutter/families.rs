@@ -57,6 +57,13 @@ impl Cutter {
         Some(key.of(self))
     }
 
+    /// Its word and dimensions in one word, `ball:6`: as the command line takes it, rounded to four decimals, mm and degrees.
+    pub fn short_name(&self) -> String {
+        let family = self.family();
+        let rounded = |key: &CutterKey| (key.of(self) * 1e4).round() / 1e4;
+        family.keys.iter().fold(family.word.to_owned(), |name, key| format!("{name}:{}", rounded(key)))
+    }
+
     /// Reads a cutter from the table `[cutter]`, which may have the keys `besides` too.
     ///
     /// # Errors

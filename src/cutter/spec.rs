@@ -69,6 +69,13 @@ mod tests {
     }
 
     #[test]
+    fn a_short_name_is_read_back() {
+        for word in ["ball:6", "flat:31.75", "bull:10:2", "taper:2:1:5:6"] {
+            assert_eq!(word.parse::<Cutter>().unwrap().short_name(), word);
+        }
+    }
+
+    #[test]
     fn words_name_cutters() {
         assert_eq!("ball:6".parse(), Cutter::ball(6.0).map_err(Into::into));
         assert_eq!("flat:0.5".parse(), Cutter::flat(0.5).map_err(Into::into));

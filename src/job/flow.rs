@@ -139,7 +139,8 @@ impl Session {
             )?;
         }
         if cutters.are_several() {
-            self.on_cells(request, engine, "measured with one tool at a time: write `tool = 2` for tool 2")?;
+            let one = "measured with one tool at a time: write `tool = 2` (verify: --tool 2) for tool 2";
+            self.on_cells(request, engine, one)?;
         }
         if !earlier.is_empty() {
             self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;

@@ -2,8 +2,8 @@
 //!
 //! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
 //! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID, MSYS), what describes it is kept
-//! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
-//! understood stops the reading.
+//! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move tool or part and is not
+//! understood stops the reading. Text that goes into the program as it stands (INSERT, PREFUN, AUXFUN) may move both, too.
 
 use geometry::{Point3, Vector3};
 
@@ -12,9 +12,11 @@ use crate::control::Plane;
 use crate::error::{Fault, ProgramError, Stop};
 use crate::lines::Lines;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+use crate::tools::{Said, cutter_of_remark, same_cutter};
 
-/// Major words that move nothing, with those that only machines act on.
-const QUIET: [&str; 36] = [
+/// Major words that move neither tool nor part: what is printed or shown, coolant and stops, tolerances that the locations keep already,
+/// levels and limits that other words act on.
+const QUIET: [&str; 28] = [
     "PARTNO",
     "PPRINT",
     "REMARK",
@@ -28,8 +30,6 @@ const QUIET: [&str; 36] = [
     "OUTTOL",
     "TOLER",
     "LINTOL",
-    "PREFUN",
-    "AUXFUN",
     "SEQNO",
     "TOOLPATH",
     "TLDATA",
@@ -37,21 +37,30 @@ const QUIET: [&str; 36] = [
     "END-OF-PATH",
     "TOOLNO",
     "OPERATION",
-    "ROTHED",
     "DISPLY",
     "LEADER",
     "CHECK",
-    "INSERT",
     "TPRINT",
     "PROGRAM",
     "MCHTOL",
-    "CATMAT",
     "CATPROCESS",
-    "CATCALL",
-    "PIVOTZ",
     "SELCTL",
-    "HEAD",
 ];
+
+/// Major words that move tool or part in ways that only the machine knows, unless they are OFF.
+const MOVING: [&str; 20] = [
+    "GOHOME", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "CYCLE", "COPY", "INDEX", "TRACUT",
+    "ROTABL", "TRANS", "ORIGIN", "RETRCT", "RETRACT", "PLUNGE", "REWIND", "UNLOAD", "PIVOTZ",
+];
+
+/// Codes of G that move nothing among locations that are written in absolute coordinates and mm/min.
+const QUIET_G: [u16; 9] = [8, 9, 17, 40, 61, 64, 80, 90, 94];
+
+/// The work offsets, which place the part as long as nothing has moved.
+const WORK_OFFSETS_G: std::ops::RangeInclusive<u16> = 54..=59;
+
+/// Codes of M that move no axis: stops, coolant, clamps, overrides.
+const QUIET_M: [u16; 14] = [0, 1, 7, 8, 9, 10, 11, 48, 49, 50, 51, 52, 53, 60];
 
 /// Words after which all of the line is text.
 const TEXT: [&str; 5] = ["PARTNO", "PPRINT", "REMARK", "INSERT", "TPRINT"];
@@ -117,6 +126,10 @@ struct Reader {
     first: Option<Frame>,
     /// How many CUTTERs have their tool.
     described: usize,
+    /// The head in use, where one is named.
+    head: Option<String>,
+    /// The line of a fault where that is another than the one at hand, from 0.
+    blamed: Option<usize>,
     /// The one in force, where it is another.
     frame: Option<Frame>,
     setting: Setting,
@@ -141,12 +154,18 @@ pub fn read_apt(name: &str, bytes: &[u8]) -> Result<Program, ProgramError> {
     let lines = Lines::new(bytes).map_err(|(line, stop)| stop.in_line(name, line))?;
     let mut reader = Reader::new(name, lines.len());
     let mut line = 0;
-    while line < lines.len() && !reader.out.ended {
+    while line < lines.len() {
         let (statement, next) = statement(&lines, line).map_err(|stop| stop.in_line(name, line))?;
         if let Some(statement) = statement {
-            reader.run(&statement).map_err(|stop| stop.in_line(name, statement.line))?;
+            let ran =
+                if reader.out.ended { reader.run_behind_the_end(&statement) } else { reader.run(&statement) };
+            ran.map_err(|stop| stop.in_line(name, reader.blamed.unwrap_or(statement.line)))?;
         }
         line = next;
+    }
+    // A CUTTER that no motion follows describes nothing.
+    if reader.described > 0 {
+        reader.out.tools.truncate(reader.described);
     }
     Ok(reader.out)
 }
@@ -239,6 +258,22 @@ impl Statement {
         }
     }
 
+    /// Its words as whole numbers of codes; `None` where one is none, or there is none.
+    fn codes(&self) -> Option<Vec<u16>> {
+        let code = |(word, _): &(String, usize)| {
+            number(word)
+                .filter(|code| code.fract() == 0.0 && (0.0..1000.0).contains(code))
+                .map(|code| code as u16)
+        };
+        self.words.iter().map(code).collect::<Option<Vec<u16>>>().filter(|codes| !codes.is_empty())
+    }
+
+    /// Whether it turns by no angle, or is switched off.
+    fn turns_nothing(&self) -> bool {
+        let angles = self.numbers();
+        self.has("OFF") || !angles.is_empty() && angles.iter().all(|angle| *angle == 0.0)
+    }
+
     fn has(&self, word: &str) -> bool {
         self.words.iter().any(|(other, _)| other == word)
     }
@@ -247,6 +282,10 @@ impl Statement {
         let words: Vec<&str> = self.words.iter().map(|(word, _)| word.as_str()).collect();
         format!("{}/{}", self.major, words.join(","))
     }
+}
+
+fn not_understood(statement: &Statement) -> Stop {
+    Stop::new(0, Fault::Statement(statement.text()))
 }
 
 /// A number of APT; exponents are written with E or D.
@@ -277,6 +316,8 @@ impl Reader {
             per_revolution: false,
             first: None,
             described: 0,
+            head: None,
+            blamed: None,
             frame: None,
             setting,
             changed: true,
@@ -291,12 +332,14 @@ impl Reader {
             "GOTO" => self.go_to(statement),
             "GODLTA" => self.go_by(statement),
             "FROM" => self.from(statement),
-            "GOHOME" | "GOFWD" | "GOLFT" | "GORGT" | "GOBACK" | "GOUP" | "GODOWN" | "CYCLE" | "COPY"
-            | "INDEX" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN"
-                if !statement.has("OFF") =>
-            {
-                Err(Stop::new(0, Fault::Statement(statement.text())))
-            }
+            moving if MOVING.contains(&moving) && !statement.has("OFF") => Err(not_understood(statement)),
+            moving if MOVING.contains(&moving) => Ok(()),
+            "ROTHED" if statement.turns_nothing() => Ok(()),
+            "INSERT" if self.inserts_nothing(statement) => Ok(()),
+            "PREFUN" if self.is_quiet_g(statement) => Ok(()),
+            "PREFUN" | "ROTHED" | "INSERT" => Err(not_understood(statement)),
+            "AUXFUN" => self.auxiliary(statement),
+            "HEAD" => self.take_head(statement),
             "RAPID" => {
                 self.rapid = true;
                 Ok(())
@@ -306,7 +349,12 @@ impl Reader {
                 Ok(())
             }
             "UNITS" => {
+                let before = self.unit;
                 self.unit = if statement.has("INCHES") || statement.has("INCH") { 25.4 } else { 1.0 };
+                // In which unit a CUTTER just before counts is not said.
+                let open =
+                    self.described..if before == self.unit { self.described } else { self.out.tools.len() };
+                self.out.tools[open].iter_mut().for_each(|tool| tool.text += " before UNITS");
                 Ok(())
             }
             "SPINDL" => {
@@ -342,7 +390,7 @@ impl Reader {
             // Where the control is to shift the path by is not said.
             "CUTCOM" if !statement.has("LEFT") && !statement.has("RIGHT") => Ok(()),
             "CIRCLE" => self.circle(statement),
-            "MULTAX" | "CYCLE" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN" => Ok(()),
+            "MULTAX" => Ok(()),
             "FINI" => {
                 self.out.ended = true;
                 Ok(())
@@ -359,6 +407,96 @@ impl Reader {
                 Err(Stop::new(0, Fault::Statement(text)))
             }
         }
+    }
+
+    /// Behind FINI nothing may move.
+    fn run_behind_the_end(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let major = statement.major.as_str();
+        let moves = major.starts_with("GO")
+            || MOVING.contains(&major)
+            || matches!(major, "CIRCLE" | "INSERT" | "CALL");
+        if moves {
+            return Err(Stop::new(0, Fault::BehindTheEnd("FINI")));
+        }
+        self.note(statement.line, "what stands behind FINI is passed over".to_owned());
+        Ok(())
+    }
+
+    /// Whether PREFUN names codes of G that move nothing here.
+    fn is_quiet_g(&self, statement: &Statement) -> bool {
+        let quiet = |code: u16| QUIET_G.contains(&code) || !self.begun && WORK_OFFSETS_G.contains(&code);
+        statement.codes().is_some_and(|codes| codes.into_iter().all(quiet))
+    }
+
+    /// Whether the text of INSERT is empty, a remark, or codes that move nothing.
+    fn inserts_nothing(&self, statement: &Statement) -> bool {
+        let text = statement.words.first().map_or("", |(text, _)| text.as_str());
+        let code = text.split('(').next().unwrap_or_default().trim();
+        let is_remark =
+            code.len() == text.len() || text.matches('(').count() == 1 && text.trim_end().ends_with(')');
+        let quiet = |word: &str| {
+            let number = word.get(1..).and_then(|digits| digits.parse::<u16>().ok());
+            match word.as_bytes()[0].to_ascii_uppercase() {
+                b'N' => number.is_some(),
+                b'M' => number.is_some_and(|code| QUIET_M.contains(&code)),
+                b'G' => number.is_some_and(|code| QUIET_G.contains(&code)),
+                _ => false,
+            }
+        };
+        is_remark && code.split_whitespace().all(quiet)
+    }
+
+    /// `AUXFUN/n`: a code of M.
+    fn auxiliary(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let codes = statement.codes().ok_or_else(|| not_understood(statement))?;
+        for code in codes {
+            let spindle = match code {
+                3 => Spindle::Clockwise,
+                4 => Spindle::Anticlockwise,
+                5 | 19 => Spindle::Off,
+                2 | 30 => {
+                    self.out.ended = true;
+                    return Ok(());
+                }
+                quiet if QUIET_M.contains(&quiet) => continue,
+                _ => return Err(not_understood(statement)),
+            };
+            (self.setting.spindle, self.changed) = (spindle, true);
+        }
+        Ok(())
+    }
+
+    /// `HEAD/n`: another head carries another tool.
+    fn take_head(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let named = statement.text();
+        if self.begun && self.head.as_ref() != Some(&named) {
+            return Err(not_understood(statement));
+        }
+        self.head = Some(named);
+        Ok(())
+    }
+
+    /// Lays the CUTTERs since the last motion to the tool that moves next. The last of them counts.
+    fn take_cutter(&mut self) -> Result<(), Stop> {
+        let Some(last) = self.out.tools.len().checked_sub(1).filter(|last| *last >= self.described) else {
+            return Ok(());
+        };
+        let tool = self.setting.tool;
+        let mut latest = self.out.tools.swap_remove(last);
+        self.out.tools.truncate(self.described);
+        latest.tool = tool;
+        let same = |other: &ToolRemark| {
+            let [a, b] = [other, &latest].map(|remark| cutter_of_remark(&remark.text, None));
+            other.text == latest.text
+                || matches!((a, b), (Said::Cutter(a), Said::Cutter(b)) if same_cutter(&a, &b))
+        };
+        if let Some(other) = self.out.tools.iter().find(|other| other.tool == tool && !same(other)) {
+            self.blamed = Some(latest.line as usize - 1);
+            return Err(Stop::new(0, Fault::OtherCutter { tool, line: other.line }));
+        }
+        self.out.tools.push(latest);
+        self.described = self.out.tools.len();
+        Ok(())
     }
 
     fn note(&mut self, line: usize, text: String) {
@@ -456,8 +594,7 @@ impl Reader {
             self.begun = true;
             return Ok(());
         }
-        self.push(statement.line, StepKind::Set);
-        Ok(())
+        self.push(statement.line, StepKind::Set)
     }
 
     fn location(&self, statement: &Statement, what: &'static str) -> Result<(Point3, Vector3), Stop> {
@@ -518,26 +655,15 @@ impl Reader {
                 StepKind::Arc(self.out.arcs.len() as u32 - 1)
             }
         };
-        self.push(line, kind);
-        Ok(())
+        self.push(line, kind)
     }
 
-    fn push(&mut self, line: usize, kind: StepKind) {
+    fn push(&mut self, line: usize, kind: StepKind) -> Result<(), Stop> {
         if self.changed {
             self.changed = false;
             self.out.settings.push(self.setting);
         }
-        // A cutter is that of the tool which moves next.
-        for k in std::mem::replace(&mut self.described, self.out.tools.len())..self.out.tools.len() {
-            let tool = self.setting.tool;
-            if self.out.tools[..k]
-                .iter()
-                .any(|other| other.tool == tool && other.text != self.out.tools[k].text)
-            {
-                self.note(line, format!("tool {tool} has several CUTTERs: the first one counts"));
-            }
-            self.out.tools[k].tool = tool;
-        }
+        self.take_cutter()?;
         let feed = match kind {
             StepKind::Feed | StepKind::Arc(_) if self.per_revolution => self.feed * self.setting.speed,
             StepKind::Feed | StepKind::Arc(_) => self.feed,
@@ -546,6 +672,7 @@ impl Reader {
         let setting = self.out.settings.len() as u32 - 1;
         self.out.steps.push(Step { kind, to: place(&self.at), feed, line: line as u32 + 1, setting });
         self.out.axes.push(self.axis.into());
+        Ok(())
     }
 
     /// `CIRCLE/x,y,z,i,j,k,r[,…]`: the next location is reached along it.

@@ -335,6 +335,29 @@ pub(crate) fn plain_name(text: &[u8]) -> String {
     name(text)
 }
 
+/// Whether a line is words of a block, one of which moves an axis; remarks left aside. No expression is computed.
+pub(crate) fn has_axis_words(line: &[u8]) -> bool {
+    let (mut depth, mut code) = (0, Vec::new());
+    for byte in line.split(|b| *b == b';').next().unwrap_or_default() {
+        match byte {
+            b'(' => depth += 1,
+            b')' => depth -= i32::from(depth > 0),
+            b if depth == 0 && !b.is_ascii_whitespace() => code.push(b.to_ascii_uppercase()),
+            _ => {}
+        }
+    }
+    let mut rest = code.strip_prefix(b"/").unwrap_or(&code);
+    let (mut moves, mut words) = (false, true);
+    while let [letter, behind @ ..] = rest {
+        let value = |b: &u8| b.is_ascii_digit() || b"+-.#[]*".contains(b);
+        let length = behind.iter().take_while(|b| value(b)).count();
+        words &= letter.is_ascii_uppercase() && length > 0;
+        moves |= b"XYZABCUVW".contains(letter);
+        rest = &behind[length..];
+    }
+    words && moves
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -284,6 +284,9 @@ pub struct Control {
     pub dwell_in_ms: bool,
     /// The M words, in tenths, with which the control begins and ends to move the linear axes along with the rotary ones.
     pub tcp_switch: Option<[u16; 2]>,
+    /// Under which setting rapid moves run straight, in a clause, where they may lead each axis at its own rate; `None` where they run
+    /// straight on all of them.
+    pub straight_rapids: Option<&'static str>,
     /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as well.
     pub arc_tolerance: f64,
 }
@@ -422,6 +425,7 @@ pub const GENERAL: Control = Control {
     repeats_in_p: true,
     dwell_in_ms: true,
     tcp_switch: None,
+    straight_rapids: None,
     arc_tolerance: 0.01,
 };
 
@@ -464,6 +468,7 @@ pub const LINUXCNC: Control = Control {
     repeats_in_p: false,
     dwell_in_ms: false,
     tcp_switch: Some([4280, 4290]),
+    straight_rapids: None,
     arc_tolerance: 0.001_27,
 };
 
@@ -491,6 +496,7 @@ pub const FANUC: Control = Control {
     },
     may_count_increments: true,
     repeats_in_p: true,
+    straight_rapids: Some("On a Fanuc control they do so with parameter 1401 bit 1 (LRP) = 1"),
     ..GENERAL
 };
 
@@ -502,6 +508,7 @@ pub const HAAS: Control = Control {
     cycle_repeats: (b"L", 0),
     variables: Variables { free: &[(1, 999), (10_000, 10_999)], ..FANUC.variables },
     repeats_in_p: false,
+    straight_rapids: Some("On a Haas control they do so with setting 335 (linear rapid mode)"),
     ..FANUC
 };
 

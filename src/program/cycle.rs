@@ -88,7 +88,11 @@ impl Interpreter<'_> {
         let words_stay = self.control.cycle_words_stay;
         let mut taken = |letter: u8| self.block.take(letter).map(|x| x * modal.unit);
         let (z, r, q) = (taken(AXES[w]), taken(b'R'), taken(b'Q'));
+        if modal.absolute && (z.is_some() || r.is_some()) {
+            self.check_offset(w)?;
+        }
         let shifts = matches!(cycle.down, Down::Back) || cycle.code == 76;
+        let mut taken = |letter: u8| self.block.take(letter).map(|x| x * modal.unit);
         let aside = if shifts { [taken(b'I'), taken(b'J')] } else { [None; 2] };
         self.state.sticky.dwell = self.dwell_word()?.unwrap_or(self.state.sticky.dwell);
         let sticky = &mut self.state.sticky;

@@ -230,8 +230,22 @@ pub enum Fault {
     #[error("the motion along the CIRCLE {0}")]
     Circle(String),
     /// A statement of APT that moves the tool in a way that cannot be followed.
-    #[error("`{0}` is not understood, and it may move the tool")]
+    #[error("`{0}` is not understood, and it may move the tool or the part")]
     Statement(String),
+    /// A tool with two cutters.
+    #[error("this CUTTER is another one than that of line {line}, and the tool is {tool} in both")]
+    OtherCutter {
+        /// The tool.
+        tool: u32,
+        /// The line of the other one, from 1.
+        line: u32,
+    },
+    /// A work offset of which it is not known how far it is from that of the part's zero.
+    #[error("{0}")]
+    Offset(String),
+    /// Motion behind what ends the program.
+    #[error("motion stands behind the {0} that ends the program")]
+    BehindTheEnd(&'static str),
     /// The wrong number of values.
     #[error("{what} takes {wanted} numbers, found {found}")]
     Count {
@@ -300,6 +314,13 @@ impl Fault {
                 "check CIRCLE (centre, axis, radius) and the locations around it, or write straight GOTO motion"
             }
             Self::Statement(_) => "write plain GOTO motion in the post processor's output",
+            Self::OtherCutter { .. } => {
+                "give each cutter a tool of its own: write LOADTL with another number before it"
+            }
+            Self::Offset(_) => {
+                "set the work offsets before the first move, or give `workpiece_zero` and `gauge_length` of the machine"
+            }
+            Self::BehindTheEnd(_) => "delete what stands there, or what ends the program before it",
             Self::Count { .. } => "correct the statement",
         }
     }

@@ -45,6 +45,8 @@ pub(crate) fn fed_length(from: &Place, to: &Place) -> f64 {
 pub(crate) struct Frame {
     /// Work offsets with their turns about z, degrees.
     pub work: Vec<(Place, f64)>,
+    /// The lines that set them to machine coordinates, of each axis.
+    pub set: Vec<[Option<u32>; 6]>,
     /// The one in force, from 0.
     pub active: usize,
     /// G92.
@@ -63,6 +65,7 @@ impl Frame {
     pub fn new(work: [Place; WORK_OFFSETS]) -> Self {
         Self {
             work: work.map(|offset| (offset, 0.0)).to_vec(),
+            set: vec![[None; 6]; WORK_OFFSETS],
             active: 0,
             shift: [0.0; 6],
             shifted: true,
@@ -76,6 +79,11 @@ impl Frame {
     fn turn(&self) -> Option<Rotation> {
         let angle = self.work[self.active].1;
         (angle != 0.0).then_some(Rotation { axes: [0, 1], centre: [0.0; 2], angle })
+    }
+
+    /// Whether axes of the program are not those of the machine.
+    pub fn turns(&self) -> bool {
+        self.rotation.is_some() || self.work[self.active].1 != 0.0
     }
 
     /// Shift and local offset together.

@@ -202,6 +202,53 @@ fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);
 }
 
+/// Where a work offset that nobody set is on the machine is not known, so that one with machine coordinates has no place beside it.
+#[test]
+fn an_offset_beside_one_that_nobody_knows_is_refused() {
+    let read = |text: &str, control| read_gcode("a.nc", text.as_bytes(), control, &Setup::from_above(200.0));
+    let fanuc = &FANUC;
+    for (text, line) in [
+        ("G0 X1 Y1 Z5\nG10 L2 P1 X0 Y0 Z-2\nG91 X1\nG90 X2\nM30\n", 4),
+        ("G0 X1 Y1 Z5\n#5223=-2.\nX2\nY2\nZ1\nM30\n", 5),
+        ("G0 X1 Y1 Z5\nG10 L2 P2 Z-2\nG55\nX2 Y2\nG81 Z-1 R1 F9\nM30\n", 5),
+        ("G10 L2 P1 X-300 Y-200 Z-400\nG0 X1\nG55 X2\nM30\n", 3),
+        ("G53 G0 Z-20\nG10 L2 P1 Z-400\nG0 Z5\nM30\n", 3),
+        ("G0 X1 Y1\nG10 L2 P1 Y9\nG68 X0 Y0 R45\nX5\nM30\n", 4),
+    ] {
+        let error = read(text, fanuc).expect_err(text);
+        assert_eq!(error.line, line, "{text}: {error}");
+        assert!(matches!(error.fault, Fault::Offset(_)), "{text}: {error}");
+        // On a machine whose offsets are known the place is.
+        assert!(read_gcode("a.nc", text.as_bytes(), fanuc, &Setup::default()).is_ok(), "{text}");
+    }
+    for text in [
+        // All are set before the first move, or all by what was there.
+        "G91 G28 Z0\nG90 G10 L2 P1 X-300 Y-200 Z-400\nG10 L2 P2 X-250 Y-200 Z-400\nG0 X1 Y1 Z1\nG55 X2 Y2 Z2\nM30\n",
+        "G0 X1 Y1 Z5\n#5223=#5223-0.1\nX2\nZ1\nM30\n",
+        "G0 X1 Y1 Z5\nG91 G10 L2 P1 Z-0.1\nG90 Z1\nM30\n",
+        "G0 X1 Y1 Z5\nG10 L20 P2 X0 Y0 Z0\nG55 X2 Z1\nM30\n",
+        // Nothing moves in it.
+        "G0 X1 Y1 Z5\nG10 L2 P1 X0 Y0 Z0\nG91 G28 Z0\nM30\n",
+        "G0 X1 Y1 Z5\nG55 X2 Y2 Z1\nM30\n",
+    ] {
+        assert!(read(text, fanuc).is_ok(), "{text}: {:?}", read(text, fanuc));
+    }
+}
+
+#[test]
+fn motion_behind_the_closing_mark_is_refused() {
+    for (text, line) in [
+        ("G1 X1 F9\n%\nG0 X5 Y5\nG1 Z-1\nM30\n", 3),
+        ("%\nO1\nG1 X1 F9\nM3\n%\n(NEXT)\nO2\n/N5 G0 Z[#1-5]\n%\n", 8),
+    ] {
+        assert_eq!(refused(text, GENERAL_CONTROL), (line, 1, Fault::BehindTheEnd("%")), "{text}");
+    }
+    let noted = read("%\nG1 X1 F9\n%\n\nMADE BY X3 FOR A 5 AXIS MILL\n");
+    assert_eq!((noted.ended, noted.notes.len(), noted.notes[0].line), (true, 1, 5));
+    assert!(read("%\nG1 X1 F9\n%\n\n%\n").notes.is_empty());
+    assert!(read("%\nG1 X1 F9\nM30\n%\nX5\n").notes.is_empty());
+}
+
 #[test]
 fn cycles_of_fanuc() {
     let program = read_with(

@@ -3,7 +3,7 @@
 //! The order within a block is that of LinuxCNC and ISO 6983: feed mode, F, S, T, M6, spindle, then the codes that set
 //! something, then the motion, then stops.
 
-use crate::block::{Block, CodeWord};
+use crate::block::{self, Block, CodeWord};
 use crate::compensation::{Compensation, Way};
 use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
 use crate::error::{Fault, ProgramError, Stop};
@@ -93,6 +93,12 @@ pub(crate) struct Interpreter<'a> {
     pub shift: usize,
     /// A number without a point was noted.
     noted_increments: bool,
+    /// The unit of the first G20 or G21, mm.
+    unit_said: Option<f64>,
+    /// The work offset in which the program first moved, and the lines that had set it by then.
+    zero_set: Option<(usize, [Option<u32>; 6])>,
+    /// Work offsets have their places on the machine, set or not.
+    offsets_known: bool,
 }
 
 impl<'a> Interpreter<'a> {
@@ -119,6 +125,9 @@ impl<'a> Interpreter<'a> {
             compensation: None,
             shift: 0,
             noted_increments: false,
+            unit_said: None,
+            zero_set: None,
+            offsets_known: setup.offsets_known,
         }
     }
 
@@ -142,7 +151,7 @@ impl<'a> Interpreter<'a> {
                 // What follows the closing mark is no program.
                 if marks == 2 || marks == 1 && !self.out.steps.is_empty() {
                     self.out.ended = true;
-                    return Ok(());
+                    return self.behind_the_mark();
                 }
                 self.line += 1;
                 continue;
@@ -161,6 +170,22 @@ impl<'a> Interpreter<'a> {
         self.flow.check_closed()
     }
 
+    /// No control reads what stands behind the closing mark: motion there was meant to run.
+    fn behind_the_mark(&mut self) -> Result<(), Stop> {
+        let rest = self.line + 1..self.lines.len();
+        if let Some(line) = rest.clone().find(|line| block::has_axis_words(self.lines.get(*line))) {
+            self.line = line;
+            return Err(Stop::new(0, Fault::BehindTheEnd("%")));
+        }
+        let is_text =
+            |line: &usize| self.lines.get(*line).iter().any(|b| !b.is_ascii_whitespace() && *b != b'%');
+        if let Some(line) = rest.into_iter().find(is_text) {
+            self.line = line;
+            self.note("what stands behind the closing % is passed over");
+        }
+        Ok(())
+    }
+
     /// Runs the text of a line from byte `from` on.
     pub fn step(&mut self, line: &'a [u8], from: usize) -> Result<Next, Stop> {
         let Self { block, parameters, state, control, compensation, .. } = self;
@@ -168,6 +193,7 @@ impl<'a> Interpreter<'a> {
         let system = |number| state.system(number, variables, compensated);
         let scope = Scope { parameters, system: &system, logic: control.logic };
         let text = &line[from.min(line.len())..];
+        state.unset_was_read.set(false);
         block.read(text, control, self.delete, scope).map_err(|stop| shifted(stop, from))?;
         if self.block.deleted {
             return Ok(Next::Line);
@@ -272,6 +298,9 @@ impl<'a> Interpreter<'a> {
                 return Err(Stop::new(0, Fault::Meanwhile(format!("#{number}"))));
             }
             self.state.frame.work[set].0[axis] = value * self.unit_of(axis);
+            // What is reckoned from a value that nobody said is as little known.
+            let known = !self.state.unset_was_read.get();
+            self.state.frame.set[set][axis] = known.then(|| self.line_number());
             self.state.reframe();
         }
         if number == 3000 { Err(Stop::new(0, Fault::Alarm(value))) } else { Ok(()) }
@@ -317,7 +346,11 @@ impl<'a> Interpreter<'a> {
                     _ => asked.motion = Some((motion, *word)),
                 },
                 Code::Plane(plane) => modal.plane = plane,
-                Code::Units { inch } => modal.unit = if inch { INCH } else { 1.0 },
+                Code::Units { inch } => {
+                    modal.unit = if inch { INCH } else { 1.0 };
+                    let said = *self.unit_said.get_or_insert(modal.unit);
+                    self.out.both_units |= said != modal.unit;
+                }
                 Code::Absolute(absolute) => modal.absolute = absolute,
                 Code::ArcAbsolute(absolute) => modal.arc_absolute = absolute,
                 Code::Feed(mode) => {
@@ -631,12 +664,20 @@ impl<'a> Interpreter<'a> {
             }
             let shown = frame.machine_place(&at);
             (0..6).for_each(|k| offset[k] += self.state.place[k] - shown[k]);
+            // The place here is known as far as the part's zero is.
+            let line = self.line_number();
+            for k in (0..6).filter(|k| named[*k].is_some()) {
+                self.state.frame.set[index][k] = self.zero_set.and_then(|(_, set)| set[k]).map(|_| line);
+            }
         } else {
+            let counts_from_zero = self.state.modal.absolute || self.control.one_shift;
             for k in 0..6 {
                 if let Some(x) = named[k] {
-                    let old =
-                        if self.state.modal.absolute || self.control.one_shift { 0.0 } else { offset[k] };
+                    let old = if counts_from_zero { 0.0 } else { offset[k] };
                     offset[k] = old + x * self.unit_of(k);
+                    if counts_from_zero {
+                        self.state.frame.set[index][k] = Some(self.line_number());
+                    }
                 }
             }
         }
@@ -734,6 +775,7 @@ impl<'a> Interpreter<'a> {
             if let Some(value) = self.block.take(letter) {
                 if absolute {
                     self.place_axis(k);
+                    self.check_offset(k)?;
                 }
                 let value = if k < 3 { value * unit } else { value };
                 to[k] = if absolute { value } else { to[k] + value };
@@ -744,6 +786,34 @@ impl<'a> Interpreter<'a> {
             }
         }
         Ok(to)
+    }
+
+    /// Refuses a place along an axis where it is not known how far the work offset in force is from that of the part's zero: one of
+    /// them is set to machine coordinates, the other stands where nobody said.
+    pub fn check_offset(&self, axis: usize) -> Result<(), Stop> {
+        let Some((first, at_first)) = self.zero_set.filter(|_| !self.offsets_known) else { return Ok(()) };
+        let frame = &self.state.frame;
+        let (active, now) = (frame.active, frame.set[frame.active]);
+        let known_alike = |k: usize| now[k].is_some() == at_first[k].is_some();
+        // A turn leads X and Y together.
+        let alike = known_alike(axis) && (axis > 1 || !frame.turns() || known_alike(0) && known_alike(1));
+        if alike {
+            return Ok(());
+        }
+        let line = now.iter().chain(&at_first).flatten().next().copied().unwrap_or_default();
+        let [first, active] = [first, active].map(offset_name);
+        let fault = match now.iter().any(Option::is_some) {
+            true if first == active => {
+                format!("line {line} sets {active}, and where {first} was in the moves before is not known")
+            }
+            true => format!(
+                "line {line} sets {active}, and where {first} is, in which the program moves first, is not known"
+            ),
+            false => format!(
+                "line {line} sets {first}, in which the program moves first, and where {active} is is not known"
+            ),
+        };
+        Err(Stop::new(self.block.column(AXES[axis]), Fault::Offset(fault)))
     }
 
     /// An axis is led to a place.
@@ -911,6 +981,8 @@ impl<'a> Interpreter<'a> {
         if !self.moved && kind != StepKind::Set {
             self.moved = true;
             self.out.zero = self.zero();
+            let frame = &self.state.frame;
+            self.zero_set = Some((frame.active, frame.set[frame.active]));
         }
         if let Some(k) =
             self.state.place.iter().position(|x| x.is_nan() || x.abs() > geometry::MAX_COORDINATE)
@@ -980,6 +1052,15 @@ impl<'a> Interpreter<'a> {
         } else {
             Err(self.value(letter, value, expected))
         }
+    }
+}
+
+/// How programs call a work offset, counted from 0.
+fn offset_name(index: usize) -> String {
+    match index {
+        0..=5 => format!("G{}", 54 + index),
+        6..=8 => format!("G59.{}", index - 5),
+        _ => format!("G54.1 P{}", index + 1 - crate::frame::WORK_OFFSETS),
     }
 }
 

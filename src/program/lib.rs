@@ -48,7 +48,7 @@ pub use interpret::read_gcode;
 pub use program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 pub use runs::{FEED_WHERE_NONE, Placing, ToolRun};
 pub use state::Setup;
-pub use tools::{TableTool, Tool, ToolTable, cutter_of_remark, read_tool_table};
+pub use tools::{Described, TableTool, Tool, ToolTable, read_tool_table, same_cutter};
 
 /// The control that is taken where none is named.
 pub const GENERAL_CONTROL: &Control = &CONTROLS[0];

@@ -120,6 +120,8 @@ pub struct Program {
     pub tools: Vec<ToolRemark>,
     /// Millimetres of its unit of length, where it ends.
     pub unit: f64,
+    /// Whether it counts in mm and in inches.
+    pub both_units: bool,
     /// Lines of the text.
     pub lines: usize,
     /// Whether it says where it ends.

@@ -1,5 +1,6 @@
 //! What a control remembers between blocks.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use crate::control::{FeedMode, Length, Motion, Plane, Variables};
@@ -15,6 +16,8 @@ pub(crate) const MORE_OFFSETS: usize = 300;
 pub struct Setup {
     /// Work offsets G54 to G59.3: the program's zero in machine coordinates.
     pub work: [Place; WORK_OFFSETS],
+    /// Whether these are their places on the machine; else they are the part's zero, wherever that is.
+    pub offsets_known: bool,
     /// Where G28 and G30 go, machine coordinates of the spindle nose.
     pub homes: [Place; 2],
     /// Where the machine stands, machine coordinates.
@@ -36,6 +39,7 @@ impl Default for Setup {
     fn default() -> Self {
         Self {
             work: [[0.0; 6]; WORK_OFFSETS],
+            offsets_known: true,
             homes: [[0.0; 6]; 2],
             start: [0.0; 6],
             lengths: BTreeMap::new(),
@@ -48,9 +52,10 @@ impl Default for Setup {
 }
 
 impl Setup {
-    /// A machine whose zero stands `above` the program's zero, mm, and whose tool starts there.
+    /// A machine of which nothing is known: its zero is taken to stand `above` the program's zero, mm, and its tool starts there.
     pub fn from_above(above: f64) -> Self {
-        Self { work: [[0.0, 0.0, -above, 0.0, 0.0, 0.0]; WORK_OFFSETS], ..Self::default() }
+        let work = [[0.0, 0.0, -above, 0.0, 0.0, 0.0]; WORK_OFFSETS];
+        Self { work, offsets_known: false, ..Self::default() }
     }
 
     /// A machine in whose coordinates the program's zero is `zero`, mm, and whose tool starts `above` that.
@@ -120,6 +125,8 @@ pub(crate) struct State {
     pub spindle: Spindle,
     pub speed: f64,
     pub sticky: Sticky,
+    /// The block has read a work offset that no line set.
+    pub unset_was_read: Cell<bool>,
 }
 
 impl State {
@@ -127,6 +134,7 @@ impl State {
         let mut frame = Frame::new(setup.work);
         let more = frame.work[0];
         frame.work.extend(std::iter::repeat_n(more, MORE_OFFSETS));
+        frame.set.extend(std::iter::repeat_n([None; 6], MORE_OFFSETS));
         let modal = Modal {
             motion: Motion::None,
             code: 800,
@@ -158,6 +166,7 @@ impl State {
             spindle: Spindle::Off,
             speed: 0.0,
             sticky: Sticky::default(),
+            unset_was_read: Cell::new(false),
         }
     }
 
@@ -204,6 +213,9 @@ impl State {
             let (set, axis) = variables.offset(number)?;
             // LinuxCNC keeps them in units of the machine.
             let known = variables.of_fanuc || self.modal.unit == 1.0;
+            if self.frame.set[set][axis].is_none() {
+                self.unset_was_read.set(true);
+            }
             known.then(|| self.in_units(axis, self.frame.work[set].0[axis]))
         };
         of_fanuc().or_else(of_linuxcnc).or_else(offset).map_or(System::Unknown, System::Value)

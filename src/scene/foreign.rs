@@ -12,8 +12,8 @@ use keys::{SceneError, SceneText, Section};
 use machine::kinematics::{Side, Waypoint};
 use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
-    Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
-    read_gcode,
+    Control, Described, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt,
+    read_apt, read_gcode, same_cutter,
 };
 use toolpath::{ForeignProgram, ReadProgram, ToolsMeant};
 
@@ -51,7 +51,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         Some(tools) => table(tools, scene)?,
         // Their radii shift the path where it is compensated.
         None if foreign.tools_meant == ToolsMeant::All => {
-            described(&name, &bytes, control).map_err(refused)?.0
+            described(&name, &bytes, control).map_err(refused)?.0.table
         }
         None => ToolTable::default(),
     };
@@ -73,9 +73,11 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let placing = Placing { chord: scene.tolerance.chord, kinematics, lengths: &length };
     let runs = read.runs(&placing).map_err(refused)?;
     let refused = |(message, cure): (String, String)| scene.source.error(file.span.clone(), message, cure);
-    let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
-    let (mut findings, notes) = (read.findings(&length), notes(&read));
+    let said = Described::of(&read);
+    let described = if table.tools.is_empty() { said.table.clone() } else { table };
+    let (mut findings, mut notes) = (read.findings(&length), notes(&read));
     let gauge_lengths = lengths.clone();
+    let straight_rapids = control.straight_rapids.filter(|_| !is_apt);
     let table_zero = kinematics.map_or([0.0; 2], |kinematics| {
         kinematics.axes().map(|axis| match axis.side {
             Side::Head => 0.0,
@@ -83,14 +85,20 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         })
     });
     let read = if foreign.tools_meant == ToolsMeant::All {
-        let (path, joints) = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
+        let (path, joints) = joined(known(&read, runs, &described, &said).map_err(refused)?.into_iter());
         let tools = tools_of(&path, &described);
+        let measured = described
+            .tools
+            .iter()
+            .filter(|tool| path.origin.tools.iter().any(|(_, used)| *used == tool.number));
+        measured.for_each(|tool| told_otherwise(&said, tool.number, &tool.cutter, &read.name, &mut notes));
         let before = Vec::new();
         let (unknown_before, others) = (false, false);
         ReadProgram {
             path,
             joints,
             table_zero,
+            straight_rapids,
             tools,
             gauge_lengths,
             before,
@@ -102,6 +110,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         }
     } else {
         let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
+        told_otherwise(&said, tool, &scene.cutter, &read.name, &mut notes);
         let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
         let (path, joints) = joined(runs.into_iter().filter(|run| run.tool == tool));
         findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
@@ -109,6 +118,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             path,
             joints,
             table_zero,
+            straight_rapids,
             tools: None,
             gauge_lengths,
             before,
@@ -196,11 +206,11 @@ fn utf8(bytes: Vec<u8>) -> Result<String, TableError> {
     String::from_utf8(bytes).map_err(|_| TableError::Unreadable("it is not UTF-8 text".to_owned()))
 }
 
-/// The tools that a program of G-code describes in its comments, and those that feed in it.
+/// What a program says of its cutters, and the tools that feed in it.
 ///
 /// # Errors
 /// [`TableError`] where it cannot be read.
-pub fn described_tools(path: &Path, control: &str) -> Result<(ToolTable, Vec<u32>), TableError> {
+pub fn described_tools(path: &Path, control: &str) -> Result<(Described, Vec<u32>), TableError> {
     let bytes = regular::read(path, MAX_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
     let control = Control::from_word(control).unwrap_or(program::GENERAL_CONTROL);
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
@@ -211,12 +221,12 @@ fn described(
     name: &str,
     bytes: &[u8],
     control: &'static Control,
-) -> Result<(ToolTable, Vec<u32>), ProgramError> {
-    // The radius of a cutter moves no tool from its place in the list.
-    let setup = Setup { any_radius: Some(0.0), ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+) -> Result<(Described, Vec<u32>), ProgramError> {
+    // Neither the radius of a cutter nor where a work offset is moves a tool from its place in the list.
+    let setup = Setup { any_radius: Some(0.0), offsets_known: true, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
     let read =
         if looks_like_apt(bytes) { read_apt(name, bytes) } else { read_gcode(name, bytes, control, &setup) }?;
-    Ok((ToolTable::of_remarks(&read), read.tools_that_feed()))
+    Ok((Described::of(&read), read.tools_that_feed()))
 }
 
 /// The fault shown in the text of the program, where that can be shown.
@@ -230,7 +240,12 @@ fn in_text(error: &ProgramError, bytes: &[u8]) -> SceneError {
 }
 
 /// The runs of all tools that cut; else what is wrong, and the cure. Tools without a cutter that only travel are left out.
-fn known(read: &Program, runs: Vec<ToolRun>, table: &ToolTable) -> Result<Vec<ToolRun>, (String, String)> {
+fn known(
+    read: &Program,
+    runs: Vec<ToolRun>,
+    table: &ToolTable,
+    said: &Described,
+) -> Result<Vec<ToolRun>, (String, String)> {
     if runs.is_empty() {
         return Err(nothing(read));
     }
@@ -239,8 +254,9 @@ fn known(read: &Program, runs: Vec<ToolRun>, table: &ToolTable) -> Result<Vec<To
     if let Some(ToolRun { tool, path, .. }) = runs.iter().find(missing) {
         let fed = path.moves.iter().position(|step| step.kind != MoveKind::Rapid).unwrap_or_default();
         let line = path.line_of(fed).unwrap_or_default();
-        let message =
+        let mut message =
             format!("no cutter is known for tool {tool}, which feeds in line {line} of {}", read.name);
+        said.doubts(Some(*tool)).for_each(|doubt| message += &format!("; {doubt}"));
         let cure = if *tool == 0 {
             "begin with a tool change such as `T1 M6`".to_owned()
         } else {
@@ -250,6 +266,18 @@ fn known(read: &Program, runs: Vec<ToolRun>, table: &ToolTable) -> Result<Vec<To
     }
     let known: Vec<ToolRun> = runs.into_iter().filter(|run| table.get(run.tool).is_some()).collect();
     if known.is_empty() { Err(nothing(read)) } else { Ok(known) }
+}
+
+/// Notes what a program says of a tool's cutter where another one is measured, or where it leaves that open.
+fn told_otherwise(said: &Described, tool: u32, measured: &Cutter, name: &str, notes: &mut Vec<String>) {
+    let own = measured.short_name();
+    if let Some((cutter, line)) = said.of_tool(tool).filter(|(cutter, _)| !same_cutter(cutter, measured)) {
+        let told = cutter.short_name();
+        notes.push(format!(
+            "the program says that the cutter of tool {tool} is {told} ({name} line {line}); {own} is measured, as asked"
+        ));
+    }
+    notes.extend(said.doubts(Some(tool)).map(|doubt| format!("{name} {doubt}; {own} is measured")));
 }
 
 /// The cutters of a path's tools and what holds them, by a table that knows them all.
@@ -297,7 +325,7 @@ fn chosen(meant: ToolsMeant, read: &Program, runs: &[ToolRun]) -> Result<u32, (S
                     ),
                     format!(
                         "write `tool = {}` for the tool that is the scene's cutter, or `tool = \"all\"` with a table of tools",
-                        tools[tools.len() - 1]
+                        feeding.last().unwrap_or(&tools[tools.len() - 1])
                     ),
                 )),
             }

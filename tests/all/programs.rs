@@ -250,11 +250,37 @@ fn faults_are_named_with_their_lines() {
     );
 }
 
+/// Back along a slot: straight it is clear, and at 45 degrees it leads through stock.
+#[test]
+fn a_rapid_that_may_be_bent_into_stock_leaves_the_verdict_open() {
+    let mut program = raster();
+    let start = line_of(&program, "G1 Z0");
+    program.splice(start..start, ["X16. Y4.", "G0 X0. Y0.", "G1"].map(str::to_owned));
+    let (straight, _) = verify(&program, &["--allowance", "1"]);
+    assert_eq!(straight.code, Some(0), "{}{}", straight.stdout, straight.stderr);
+    for (control, setting) in [("haas", "setting 335"), ("fanuc", "parameter 1401")] {
+        let (answer, report) = verify(&program, &["--allowance", "1", "--control", control]);
+        assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+        let report = report.unwrap();
+        assert_eq!(report["verdict"], "undecided", "{}", answer.stdout);
+        let notes = report["toolpaths"][0]["notes"].to_string();
+        let line = format!("first in line {}", start + 2);
+        assert!(notes.contains(setting) && notes.contains(&line), "{notes}");
+        assert!(answer.stdout.contains("with one rate of all axes"), "{}", answer.stdout);
+        // One axis at a time runs straight on every control.
+        let mut clear = program.clone();
+        clear.splice(start + 1..start + 2, ["G0 Z10.", "G0 X0. Y0.", "G1 Z0."].map(str::to_owned));
+        let (answer, report) = verify(&clear, &["--allowance", "1", "--control", control]);
+        assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+        assert!(!report.unwrap()["toolpaths"][0]["notes"].to_string().contains(setting));
+    }
+}
+
 #[test]
 fn wrong_offsets_and_lengths_show() {
     let mut moved = raster();
     let line = line_of(&moved, "X0.000 Y4.000");
-    moved.insert(line - 1, "G10 L2 P2 X0.5 Y0 Z-200.1\nG55 G1 Z0".to_owned());
+    moved.insert(line - 1, "G91 G10 L2 P2 X0.5 Y0 Z-0.1\nG90 G55 G1 Z0".to_owned());
     assert_violates(&moved, &[], "gouge 100.0");
     let home = tempfile::tempdir().unwrap();
     let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 80\n";
@@ -437,6 +463,73 @@ fn cutters_come_from_tables_of_linuxcnc_and_from_comments() {
         "{}",
         answer.stderr
     );
+}
+
+/// Verifies the plate by a program alone, without `--cutter`.
+fn verify_by_comments(program: &[String], options: &[&str]) -> (Answer, Option<Value>) {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("plate.stl"), plate()).unwrap();
+    std::fs::write(home.path().join("job.nc"), program.join("\n") + "\n").unwrap();
+    let mut arguments =
+        vec!["verify", "--part", "plate.stl", "--program", "job.nc", "--cell", "0.1", "--out", "out"];
+    arguments.extend(options);
+    let answer = millstream(home.path(), &arguments);
+    let report = std::fs::read(home.path().join("out/report.json")).ok();
+    (answer, report.map(|bytes| serde_json::from_slice(&bytes).unwrap()))
+}
+
+/// The raster with comments behind its first two lines.
+fn raster_with(comments: &[&str]) -> Vec<String> {
+    let mut program = raster();
+    program.splice(2..2, comments.iter().map(|&comment| comment.to_owned()));
+    program
+}
+
+#[test]
+fn comments_that_leave_the_cutter_open_are_refused_with_their_lines() {
+    for (comments, told) in [
+        (&["(T1 D=20-0.5 CR=10 - ball end mill)"][..], "line 3 does not say the cutter"),
+        (&["(NOT T1 D=20 CR=10 - ball end mill)"], "line 3 does not say the cutter"),
+        (&["(T1 D=6. - bull nose end mill)"], "line 3 does not say the cutter"),
+        (&["(T1 D=1/4 CR=1/8 - ball end mill)"], "line 3 does not say the cutter"),
+        (&["(T1 D=20. CR=10.)", "(T1 D=6. CR=3.)"], "lines 3 and 4 say different cutters of tool 1"),
+    ] {
+        let (answer, report) = verify_by_comments(&raster_with(comments), &[]);
+        let told_all = answer.stderr.replace("\n", " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!((answer.code, report.is_none()), (Some(2), true), "{comments:?}: {}", answer.stdout);
+        assert!(told_all.contains(told) && told_all.contains("--cutter"), "{comments:?}: {told_all}");
+    }
+    // A unit behind the number counts, whatever that of the program is.
+    let inches = "(T1 D=.23622in CR=.11811\" - ball end mill)";
+    let (answer, _) = verify_by_comments(&raster_with(&[inches]), &[]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+}
+
+#[test]
+fn a_cutter_that_is_another_than_the_program_says_is_noted() {
+    let notes = |comments: &[&str]| -> Vec<String> {
+        let (answer, report) = verify(&raster_with(comments), &[]);
+        assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+        let notes = report.unwrap()["toolpaths"][0]["notes"].as_array().unwrap().clone();
+        notes.iter().map(|note| note.as_str().unwrap().to_owned()).collect()
+    };
+    let told =
+        "the program says that the cutter of tool 1 is ball:20 (job.nc line 3); ball:6 is measured, as asked";
+    assert!(notes(&["(T1 D=20. CR=10.)"]).contains(&told.to_owned()));
+    assert!(
+        notes(&["(T1 D=20.)", "(T1 D=8.)"]).iter().any(|note| note.contains("lines 3 and 4 say different"))
+    );
+    assert!(notes(&["(T1 D=6. CR=3. - ball)"]).iter().all(|note| !note.contains("is measured")));
+}
+
+#[test]
+fn one_cutter_for_several_tools_is_refused_with_the_words_of_verify() {
+    let (answer, report) = verify(&roughed_and_finished(), &[]);
+    assert_eq!((answer.code, report.is_none()), (Some(2), true), "{}", answer.stdout);
+    for text in ["--tool 1", "--tools"] {
+        assert!(answer.stderr.contains(text), "{text}: {}", answer.stderr);
+    }
+    assert!(!answer.stderr.contains("tool = "), "{}", answer.stderr);
 }
 
 /// A face mill that leaves a hair, then a ball that finishes.

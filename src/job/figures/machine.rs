@@ -214,6 +214,7 @@ mod tests {
 
     fn program(joints: Vec<(u32, Vec<Waypoint>)>) -> ReadProgram {
         ReadProgram {
+            straight_rapids: None,
             path: Toolpath::new(ClPoint::upright(Point3::origin()), Vec::new()),
             joints,
             table_zero: [0.0; 2],

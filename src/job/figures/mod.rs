@@ -1,6 +1,7 @@
 //! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
 //! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
 
+mod bent_rapids;
 mod clearance;
 mod correction;
 mod coverage;

@@ -5,6 +5,7 @@ use report::{Claim, Figure, Gravity};
 use serde::Serialize;
 use work::monitor::Monitor;
 
+use super::bent_rapids;
 use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
@@ -55,7 +56,8 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let findings = read.findings.iter().map(figures).collect();
     let figures = ProgramFigures { file: name.to_owned(), tool, tools, findings };
     let warnings = read.findings.iter().filter(|found| !found.kind.is_violation());
-    let notes = warnings.map(|found| format!("{name}: {}", found.text)).collect();
+    let warnings = warnings.map(|found| format!("{name}: {}", found.text));
+    let notes = warnings.chain(bent_rapids::note(run)).collect();
     let claims = CHECKED.iter().flat_map(|kind| claims(name, *kind, &read.findings, several)).collect();
     let figure = Figure { key: "program", value: value(&figures)?, rows, ..Figure::default() };
     Ok(Finding { figure: Some(figure), notes, claims })

@@ -7,8 +7,8 @@ use report::{Claim, Figure, Gravity, Verdict, place};
 use sim::{ENGAGED, InStock, KeptOut, MoveRemoval, Stock, VoxelEngine, ZMap, cut_in_order_in_turn};
 use work::monitor::Monitor;
 
-use super::entries;
 use super::words::value;
+use super::{bent_rapids, entries};
 use crate::JobError;
 use crate::run::{Finding, Run};
 
@@ -51,9 +51,12 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         contact.line = run.line(contact.move_index);
         contact.tool = run.path().named_tool_of(contact.move_index as usize);
     }
-    let mut claims = vec![match unseen {
-        Some(open) => rapid_open(run, &open),
-        None => no_rapid_in_stock(&r, run.path().program_name()),
+    let is_clear = unseen.is_none() && r.rapid_contacts.is_empty();
+    let on_bent_way = if is_clear { bent_rapids::first_in_stock(run, monitor)? } else { None };
+    let mut claims = vec![match (unseen, on_bent_way) {
+        (Some(open), _) => rapid_open(run, &open),
+        (None, Some(met)) => rapid_bent(run, &met),
+        (None, None) => no_rapid_in_stock(&r, run.path().program_name()),
     }];
     if run.request.foreign().is_some_and(|read| read.unknown_before) {
         doubt(&mut claims, TOOLS_BEFORE);
@@ -106,13 +109,17 @@ pub(super) fn first_in_stock(
     asked: impl Fn(usize) -> Option<KeptOut> + Sync + Send,
     monitor: &dyn Monitor,
 ) -> Result<Option<InStock>, JobError> {
-    let stock = match run.session.roughed_stock() {
-        Stock::Roughed { block, .. } => Stock::Box(block),
-        stock => stock,
-    };
     let (path, cutters) = (run.path(), run.own_cutters);
     let strays = path.origin.strays;
-    Ok(sim::first_in_stock(&stock, &run.before(), cutters, path, strays, asked, monitor)?)
+    Ok(sim::first_in_stock(&whole_stock(run), &run.before(), cutters, path, strays, asked, monitor)?)
+}
+
+/// The stock, of a roughed block the whole.
+pub(super) fn whole_stock(run: &Run<'_>) -> Stock {
+    match run.session.roughed_stock() {
+        Stock::Roughed { block, .. } => Stock::Box(block),
+        stock => stock,
+    }
 }
 
 /// Lists a rapid move in stock that the centres of cells do not show, where it is certain; else hands it back.
@@ -134,6 +141,19 @@ fn rapid_open(run: &Run<'_>, open: &InStock) -> Claim {
     );
     let claim = Claim::length("rapid", Gravity::Crash, ENGAGED, 0.0, f64::INFINITY).told(text);
     Claim { decided_by: "a rapid move farther from what stands would decide it", ..claim }
+}
+
+/// That a rapid move is clear of stock on its straight way and not on its bent one.
+fn rapid_bent(run: &Run<'_>, met: &InStock) -> Claim {
+    let text = format!(
+        "whether a rapid move touches stock is open: with one rate of all axes move {}{} comes to stock at {}, and straight it does not",
+        met.move_index,
+        run.program_line(met.move_index),
+        place(met.at.into())
+    );
+    let claim = Claim::length("rapid", Gravity::Crash, ENGAGED, 0.0, f64::INFINITY).told(text);
+    let decided_by = "rapid moves of one axis at a time, or a control that leads them straight (see the note), would decide it";
+    Claim { decided_by, ..claim }
 }
 
 /// The voxel of removal in order, mm.

@@ -141,11 +141,22 @@ FINI
 #[test]
 fn a_cutter_is_that_of_the_tool_that_moves_next() {
     let text = "CUTTER/10,5\nLOADTL/1\nGOTO/0,0,1\nGOTO/1,0,1\nUNITS/INCHES\nCUTTER/0.25,0,0.125,0,0,0,2\nLOADTL/2\nGOTO/2,0,1\nFINI\n";
-    let tools = crate::ToolTable::of_remarks(&read(text));
+    let tools = crate::Described::of(&read(text)).table;
     let cutter = |tool: u32| tools.get(tool).map(|tool| tool.cutter);
     assert_eq!((cutter(1), cutter(2)), (cutter::Cutter::ball(10.0).ok(), cutter::Cutter::flat(6.35).ok()));
-    let twice = read("LOADTL/1\nCUTTER/10,5\nGOTO/0,0,1\nGOTO/1,0,1\nCUTTER/8,4\nGOTO/2,0,1\nFINI\n");
-    assert_eq!((twice.notes.len(), twice.notes[0].line), (1, 6));
+    let twice = "LOADTL/1\nCUTTER/10,5\nGOTO/0,0,1\nGOTO/1,0,1\nCUTTER/8,4\nGOTO/2,0,1\nFINI\n";
+    let error = read_apt("a.cls", twice.as_bytes()).unwrap_err();
+    assert_eq!((error.line, error.fault), (5, Fault::OtherCutter { tool: 1, line: 2 }));
+    let early =
+        crate::Described::of(&read("CUTTER/0.25,0.125\nUNITS/INCHES\nGOTO/0,0,1\nGOTO/1,0,1\nFINI\n"));
+    assert!(
+        early.table.tools.is_empty()
+            && early.doubts(Some(0)).next().is_some_and(|doubt| doubt.contains("line 1"))
+    );
+    // Before any motion the last one counts, and the same one may be said again in more words.
+    let again = "CUTTER/8,4\nCUTTER/10,5\nGOTO/0,0,1\nGOTO/1,0,1\nCUTTER/10,5,0,5,0,0,50\nGOTO/2,0,1\nFINI\n";
+    let tools = crate::Described::of(&read(again)).table;
+    assert_eq!(tools.get(0).map(|tool| tool.cutter), cutter::Cutter::ball(10.0).ok());
 }
 
 #[test]
@@ -191,11 +202,38 @@ fn what_may_move_the_tool_is_refused_with_its_line() {
         ("MSYS/0,0,0,1,0,0\n", 1, 1),
         ("MSYS/0,0,0,1,0,0,1,0,0\n", 1, 1),
         ("GOTO/1,2,3\nMSYS/0,0,0,1,0,0,0,1,0\n", 2, 1),
+        ("ROTHED/30\n", 1, 1),
+        ("ROTHED/AAXIS,ATANGL,-5\n", 1, 1),
+        ("GOTO/1,2,3\nINSERT/G1 Z-1\n", 2, 1),
+        ("GOTO/1,2,3\nINSERT G1 Z-1 F100\n", 2, 1),
+        ("GOTO/1,2,3\nINSERT/(A) X5\n", 2, 1),
+        ("GOTO/1,2,3\nINSERT/M98 P5\n", 2, 1),
+        ("GOTO/1,2,3\nPREFUN/91\n", 2, 1),
+        ("GOTO/1,2,3\nPREFUN/55\n", 2, 1),
+        ("PREFUN/G91\n", 1, 1),
+        ("AUXFUN/98\n", 1, 1),
+        ("AUXFUN/6\n", 1, 1),
+        ("PIVOTZ/100\n", 1, 1),
+        ("GOTO/1,2,3\nRETRCT\n", 2, 1),
+        ("GOTO/1,2,3\nREWIND\n", 2, 1),
+        ("CATCALL/A\n", 1, 1),
+        ("HEAD/1\nGOTO/1,2,3\nHEAD/1\nHEAD/2\n", 4, 1),
+        ("GOTO/1,2,3\nFINI\nRAPID\nGOTO/1,2,4\n", 4, 1),
+        ("GOTO/1,2,3\nAUXFUN/30\nGOTO/1,2,4\n", 3, 1),
     ] {
         let error = read_apt("a.cls", text.as_bytes()).unwrap_err();
         assert_eq!((error.line, error.column), (line, column), "{text}: {error}");
     }
     assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nCUTCOM/OFF\nMODE/ABSOL\nFINI").is_ok());
+    let quiet = "PREFUN/54\nROTHED/0\nHEAD/1\nGOTO/1,2,3\nPREFUN/64\nAUXFUN/8\nINSERT/\nINSERT/(M98 P5)\nINSERT N5 M8\nGOTO/2,2,3\nFINI\n";
+    let program = read(quiet);
+    assert!(program.ended && program.steps.len() == 1 && program.notes.is_empty(), "{:?}", program.notes);
+    let behind = read("GOTO/1,2,3\nFINI\nPPRINT DONE\n");
+    assert_eq!((behind.notes.len(), behind.notes[0].line), (1, 3));
+    let off = read("SPINDL/100\nGOTO/0,0,1\nGOTO/1,0,1\nAUXFUN/5\nFEDRAT/100\nGOTO/2,0,1\nFINI\n");
+    assert!(
+        off.findings(&|_| None).iter().any(|found| found.kind == FindingKind::SpindleOff && found.line == 6)
+    );
     let cut = read("GOTO/0,0,1\nFEDRAT/100\nGOTO/1,0,1\n");
     assert_eq!(cut.findings(&|_| None).last().map(|f| f.kind), Some(FindingKind::NoEnd));
 }

@@ -4,7 +4,7 @@ mod remark;
 mod table;
 mod tbl;
 
-pub use remark::cutter_of_remark;
-pub(crate) use remark::may_describe_a_tool;
-pub use table::{Tool, ToolTable};
+pub use remark::same_cutter;
+pub(crate) use remark::{Said, cutter_of_remark, may_describe_a_tool};
+pub use table::{Described, Tool, ToolTable};
 pub use tbl::{TableTool, read_tool_table};

@@ -1,6 +1,6 @@
 //! A table of tools in TOML: `[[tool]]` with `number`, the keys of a cutter, and what holds it.
 
-use super::remark::{cutter_of_remark, number_of_remark};
+use super::remark::{Said, cutter_of_remark, cutter_of_table, number_of_remark, same_cutter};
 use super::tbl::read_tool_table;
 use crate::error::ProgramError;
 use crate::program::Program;
@@ -66,34 +66,98 @@ impl ToolTable {
     /// [`ProgramError`] at the first word that is wrong.
     pub fn of_linuxcnc(name: &str, bytes: &[u8]) -> Result<Self, ProgramError> {
         let tools = read_tool_table(name, bytes, 1.0)?.into_iter().filter_map(|(number, tool)| {
-            let cutter = cutter_of_remark(&format!("D={} {}", tool.diameter, tool.remark), 1.0)?;
+            let cutter = cutter_of_table(&tool.remark, tool.diameter)?;
             let gauge_length = Some(tool.length[2]).filter(|length| *length != 0.0);
             Some(Tool { number, cutter, gauge_length, holder: None })
         });
         Ok(Self { tools: tools.collect() })
     }
 
-    /// The tools that a program describes in its comments. One without a number is that of the only tool in use.
-    pub fn of_remarks(program: &Program) -> Self {
-        let used = program.tools_in_use();
-        let mut tools: Vec<Tool> = Vec::new();
-        for remark in &program.tools {
-            let number = match (remark.tool, number_of_remark(&remark.text), &used[..]) {
-                (0, None, [only]) => *only,
-                (0, None, _) => continue,
-                (0, Some(number), _) | (number, _, _) => number,
-            };
-            let described = cutter_of_remark(&remark.text, program.unit);
-            if let Some(cutter) = described.filter(|_| tools.iter().all(|tool| tool.number != number)) {
-                tools.push(Tool { number, cutter, gauge_length: None, holder: None });
-            }
-        }
-        Self { tools }
-    }
-
     /// The tool of a number.
     pub fn get(&self, number: u32) -> Option<&Tool> {
         self.tools.iter().find(|tool| tool.number == number)
+    }
+}
+
+/// What a program says of its cutters, in comments or in CUTTER of APT.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Described {
+    /// The tools whose cutters it says.
+    pub table: ToolTable,
+    /// Their numbers, and the lines that say them.
+    lines: Vec<(u32, u32)>,
+    /// What cannot be read without a guess.
+    doubts: Vec<Doubt>,
+}
+
+/// A comment, or two, that leave open which cutter a tool is.
+#[derive(Debug, Clone, PartialEq)]
+struct Doubt {
+    /// Where that is known.
+    tool: Option<u32>,
+    /// In a clause.
+    text: String,
+}
+
+/// Most doubts that are kept; more tell nothing new.
+const MOST_DOUBTS: usize = 20;
+
+impl Described {
+    /// What a program says. A comment without a number is about the only tool in use. Where two comments differ, none counts.
+    pub fn of(program: &Program) -> Self {
+        let used = program.tools_in_use();
+        let unit = (!program.both_units).then_some(program.unit);
+        let mut described = Self::default();
+        let mut differ: Vec<u32> = Vec::new();
+        for remark in &program.tools {
+            let number = match (remark.tool, number_of_remark(&remark.text), &used[..]) {
+                (0, None, [only]) => Some(*only),
+                (0, None, _) => None,
+                (0, Some(number), _) | (number, _, _) => Some(number),
+            };
+            let line = remark.line;
+            match (cutter_of_remark(&remark.text, unit), number) {
+                (Said::Nothing, _) | (Said::Cutter(_), None) => {}
+                (Said::Unclear(reason), tool) => {
+                    described.doubt(tool, format!("line {line} does not say the cutter: {reason}"));
+                }
+                (Said::Cutter(cutter), Some(number)) => match described.of_tool(number) {
+                    None => {
+                        described.table.tools.push(Tool { number, cutter, gauge_length: None, holder: None });
+                        described.lines.push((number, line));
+                    }
+                    Some((first, before)) if !same_cutter(&first, &cutter) => {
+                        let [first, second] = [&first, &cutter].map(Cutter::short_name);
+                        let text = format!(
+                            "lines {before} and {line} say different cutters of tool {number}, {first} and {second}"
+                        );
+                        described.doubt(Some(number), text);
+                        differ.push(number);
+                    }
+                    Some(_) => {}
+                },
+            }
+        }
+        described.table.tools.retain(|tool| !differ.contains(&tool.number));
+        described
+    }
+
+    fn doubt(&mut self, tool: Option<u32>, text: String) {
+        if self.doubts.len() < MOST_DOUBTS {
+            self.doubts.push(Doubt { tool, text });
+        }
+    }
+
+    /// The cutter that a program says of a tool, and the line.
+    pub fn of_tool(&self, number: u32) -> Option<(Cutter, u32)> {
+        let line = self.lines.iter().find(|(tool, _)| *tool == number)?.1;
+        Some((self.table.get(number)?.cutter, line))
+    }
+
+    /// Why the cutter of a tool, or of any, is open, in clauses.
+    pub fn doubts(&self, number: Option<u32>) -> impl Iterator<Item = &str> {
+        let about = move |doubt: &&Doubt| number.is_none() || doubt.tool.is_none() || doubt.tool == number;
+        self.doubts.iter().filter(about).map(|doubt| doubt.text.as_str())
     }
 }
 
@@ -170,7 +234,7 @@ mod tests {
                 crate::GENERAL_CONTROL,
                 &crate::Setup::default(),
             );
-            ToolTable::of_remarks(&program.unwrap())
+            Described::of(&program.unwrap()).table
         };
         let tools = read("(T5 D=0.25 CR=0.125 - BALL)\nG20\nT5 M6\nG0 X1\n");
         assert_eq!(tools.get(5).unwrap().cutter, Cutter::ball(6.35).unwrap());
@@ -178,6 +242,38 @@ mod tests {
         assert_eq!((tools.tools.len(), tools.get(7).unwrap().cutter), (2, Cutter::flat(8.0).unwrap()));
         let tools = read("(BALL END D=6.0)\nT3 M6\nG0 X1\n");
         assert_eq!(tools.get(3).unwrap().cutter, Cutter::ball(6.0).unwrap());
+    }
+
+    #[test]
+    fn comments_that_differ_or_are_unclear_are_told_by_their_lines() {
+        let described = |text: &str| {
+            let read = crate::read_gcode(
+                "job.nc",
+                text.as_bytes(),
+                crate::GENERAL_CONTROL,
+                &crate::Setup::default(),
+            );
+            Described::of(&read.unwrap())
+        };
+        let twice = described("(T1 D=20. CR=10. - ball)\n(T2 D=3)\n(T1 D=6. CR=3. - ball)\nT1 M6\nG0 X1\n");
+        assert!(twice.of_tool(1).is_none() && twice.of_tool(2).is_some_and(|(_, line)| line == 2));
+        let doubts: Vec<&str> = twice.doubts(Some(1)).collect();
+        assert_eq!(doubts, ["lines 1 and 3 say different cutters of tool 1, ball:20 and ball:6"]);
+        assert_eq!(twice.doubts(Some(2)).count(), 0);
+        let same = described("(T1 D=20. CR=10. - ball)\n(T1 D=20. CR=10.)\nT1 M6\nG0 X1\n");
+        assert_eq!((same.of_tool(1).map(|(_, line)| line), same.doubts(None).count()), (Some(1), 0));
+        // What is unclear hides nothing that is clear.
+        let old = described("(OLD: T1 D=20. CR=10.)\n(T1 D=6.)\nT1 M6\nG0 X1\n");
+        assert_eq!(old.of_tool(1), Some((Cutter::flat(6.0).unwrap(), 2)));
+        assert!(
+            old.doubts(Some(1))
+                .next()
+                .unwrap()
+                .starts_with("line 1 does not say the cutter: it has the word OLD")
+        );
+        // A program that counts in both units leaves a number without one open.
+        let both = described("(T1 D=1)\n(T2 D=6MM)\nG20\nT1 M6\nG0 X1\nG21\nT2 M6\nX1\n");
+        assert!(both.of_tool(1).is_none() && both.of_tool(2).is_some());
     }
 
     #[test]

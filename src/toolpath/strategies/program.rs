@@ -54,6 +54,8 @@ pub struct ReadProgram {
     pub joints: Vec<(u32, Vec<Waypoint>)>,
     /// Where the rotary axes of a table stand in the joints' zero, rad, first and second axis; a head's stand at zero.
     pub table_zero: [f64; 2],
+    /// Under which setting of the control rapid moves run straight, in a clause; `None` where they always do.
+    pub straight_rapids: Option<&'static str>,
     /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
     /// Lengths of tools from the spindle nose to the tip by their numbers, mm, as far as the table of tools has them.
