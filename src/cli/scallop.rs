@@ -24,6 +24,8 @@ struct CrossSection {
     radius: f64,
     /// 1/mm, positive concave.
     curvature: f64,
+    /// Leads from which on the cutter fits, degrees, where it does not and one helps.
+    fits_from: Option<f64>,
     /// What was found out about the place.
     notes: Vec<String>,
 }
@@ -40,12 +42,37 @@ pub fn scallop(options: &ScallopOptions) -> Result<String, CliError> {
         Some(file) => at_place(options, file)?,
         None => by_radius(options)?,
     };
-    let ball = BallSection::new(section.radius, section.curvature).map_err(refused)?;
+    let ball = BallSection::new(section.radius, section.curvature)
+        .map_err(|reason| refused(of_cutter(reason, &options.cutter, section.fits_from)))?;
     answer(options, &section, &ball).map_err(refused)
 }
 
 fn refused(reason: ScallopError) -> CliError {
     CliError::Scallop(reason)
+}
+
+/// Leads are told to this, degrees.
+const LEAD_STEP: f64 = 0.1;
+
+/// That a cutter does not fit, with what would: it is no ball of another diameter where the cutter is none.
+fn of_cutter(reason: ScallopError, cutter: &Cutter, fits_from: Option<f64>) -> ScallopError {
+    match reason {
+        ScallopError::DoesNotFit { ball, section, .. } if !cutter.profile().is_ball() => {
+            let lead = fits_from
+                .map_or_else(String::new, |lead| format!("give a --lead of {lead:.1} degrees or more, or "));
+            let cure =
+                format!("{lead}use a smaller cutter or a ball of less than {} mm diameter", 2.0 * section);
+            ScallopError::CutterDoesNotFit { radius: ball, section, cure }
+        }
+        other => other,
+    }
+}
+
+/// The least lead, degrees, with which a cutter fits into a section where it does not: its radius across the feed is `radius_at` a lead.
+fn fitting_lead(curvature: f64, radius_at: impl Fn(f64) -> Result<f64, ScallopError>) -> Option<f64> {
+    let fits = |lead: f64| radius_at(lead).is_ok_and(|radius| BallSection::new(radius, curvature).is_ok());
+    let steps = (90.0 / LEAD_STEP) as usize;
+    (1..steps).map(|k| LEAD_STEP * k as f64).find(|lead| curvature > 0.0 && fits(*lead))
 }
 
 /// Degrees of lead as an axis over a feed and a normal; without one along `upright`.
@@ -65,9 +92,12 @@ fn by_radius(options: &ScallopOptions) -> Result<CrossSection, CliError> {
         (None, None) => 0.0,
     };
     let (feed, normal) = (Vector3::x(), Vector3::z());
-    let axis = axis(options.lead, &feed, &normal, &normal);
-    let radius = effective_radius(&options.cutter, &axis, &normal, &Vector3::y()).map_err(refused)?;
-    Ok(CrossSection { radius, curvature, notes: Vec::new() })
+    let radius_at = |lead: Option<f64>| {
+        effective_radius(&options.cutter, &axis(lead, &feed, &normal, &normal), &normal, &Vector3::y())
+    };
+    let radius = radius_at(options.lead).map_err(refused)?;
+    let fits_from = fitting_lead(curvature, |lead| radius_at(Some(lead)));
+    Ok(CrossSection { radius, curvature, fits_from, notes: Vec::new() })
 }
 
 fn at_place(options: &ScallopOptions, file: &Path) -> Result<CrossSection, CliError> {
@@ -91,8 +121,11 @@ fn at_place(options: &ScallopOptions, file: &Path) -> Result<CrossSection, CliEr
     let curvature = curvatures.along(&at, &across).ok_or_else(|| {
         refuse("the surface has no curvature there: it is a pole".into(), "give a place beside it")
     })?;
-    let axis = axis(options.lead, &feed, &at.normal, &Vector3::z());
-    let radius = effective_radius(&options.cutter, &axis, &at.normal, &across).map_err(refused)?;
+    let radius_at = |lead: Option<f64>| {
+        effective_radius(&options.cutter, &axis(lead, &feed, &at.normal, &Vector3::z()), &at.normal, &across)
+    };
+    let radius = radius_at(options.lead).map_err(refused)?;
+    let fits_from = fitting_lead(curvature, |lead| radius_at(Some(lead)));
     let [x, y, z] = at.point.coords.into();
     let [nx, ny, nz] = at.normal.into();
     let mut notes = vec![format!("at x {x:.4} y {y:.4} z {z:.4} mm, normal {nx:.5} {ny:.5} {nz:.5}")];
@@ -102,7 +135,7 @@ fn at_place(options: &ScallopOptions, file: &Path) -> Result<CrossSection, CliEr
             0.5 * options.cutter.radius()
         ));
     }
-    Ok(CrossSection { radius, curvature, notes })
+    Ok(CrossSection { radius, curvature, fits_from, notes })
 }
 
 fn load(file: &Path) -> Result<Part, CliError> {
@@ -281,6 +314,27 @@ mod tests {
         assert!(bull.contains("radius 19.27631 mm across the feed") && bull.contains("osculates"), "{bull}");
         let hollow = asked("millstream scallop --cutter ball:10 --scallop 0.1 --concave 5.05").unwrap();
         assert!(hollow.contains("Every step leaves less there"), "{hollow}");
+    }
+
+    /// What fits is told of the cutter that was given, and a lead that is told fits.
+    #[test]
+    fn a_cutter_that_does_not_fit_is_told_what_does() {
+        let of = |cutter: &str, lead: &str, section: &str| {
+            asked(&format!("millstream scallop --cutter {cutter} --lead {lead} --step 1 --concave {section}"))
+        };
+        let refused = |cutter: &str, lead: &str, section: &str| {
+            let text = of(cutter, lead, section).unwrap_err();
+            text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+        };
+        let bull = refused("bull:6:1", "10", "10");
+        assert!(bull.contains("12.5175 mm across the feed") && !bull.contains("a ball of radius"), "{bull}");
+        let lead = bull.split("--lead of ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        let less = format!("{:.1}", lead.parse::<f64>().unwrap() - LEAD_STEP);
+        assert!(of("bull:6:1", lead, "10").is_ok() && of("bull:6:1", &less, "10").is_err(), "{lead}");
+        // No lead makes a cutter narrower than its radius.
+        let flat = refused("flat:20", "5", "8");
+        assert!(!flat.contains("--lead of") && flat.contains("smaller cutter"), "{flat}");
+        assert!(refused("ball:30", "0", "10").contains("20 mm diameter"));
     }
 
     #[test]

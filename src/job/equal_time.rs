@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use scene::{EqualTime, ToolpathRequest};
-use toolpath::{PlanError, Step};
+use toolpath::Step;
 use work::monitor::Monitor;
 
 use super::planned::Planned;
@@ -100,13 +100,13 @@ impl Session {
         // Of heights that all take as long the first one is kept.
         let were_highest = figures.plans.iter().any(|tried| tried.scallop_mm >= highest);
         if machining_time_s > asked_s && !figures.is_met() && were_highest {
-            let reason = format!(
-                "it takes {:.2} minutes or more, at scallops of {highest} mm already, and {} were asked for",
-                machining_time_s / 60.0,
-                time.minutes
-            );
-            let refused = PlanError::NotApplicable { strategy: request.strategy_name(), reason };
-            return Err(JobError::plan(scene, &request.name, refused));
+            return Err(JobError::TooLittleTime {
+                scene: scene.source.name.clone(),
+                name: request.name.clone(),
+                least: (100.0 / 60.0 * machining_time_s).ceil() / 100.0,
+                highest,
+                asked: time.minutes,
+            });
         }
         planned.equal_time = Some(figures);
         Ok((at(scallop_mm), planned))
@@ -256,7 +256,11 @@ mod tests {
     #[test]
     fn a_time_that_no_plan_can_keep_is_a_row_with_its_reason() {
         let session = session("0.01", "[[toolpath]]\nstrategy = \"zigzag\"\n");
-        let refused = session.run(&Silent).map(|report| report.verdict).unwrap_err().to_string();
+        let error = session.run(&Silent).map(|report| report.verdict).unwrap_err();
+        let help = miette::Diagnostic::help(&error).unwrap().to_string();
+        assert!(help.starts_with("write `minutes = ") && help.ends_with("or more in [compare]"), "{help}");
+        assert!(error.why_not_planned().unwrap().contains("larger `minutes`"));
+        let refused = error.to_string();
         assert!(refused.contains("minutes or more") && refused.contains("0.01 were asked for"), "{refused}");
     }
 }

@@ -54,6 +54,23 @@ pub enum JobError {
         /// What the planner said.
         reason: PlanError,
     },
+    /// No plan of a toolpath takes as little time as it is compared at.
+    #[error(
+        "{scene}: the toolpath \"{name}\" takes {least:.2} minutes or more, at scallops of {highest} mm already, and {asked} were asked for"
+    )]
+    #[diagnostic(help("write `minutes = {least:.2}` or more in [compare]"))]
+    TooLittleTime {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// The least time that was found, minutes, rounded up.
+        least: f64,
+        /// The scallops that it leaves, mm.
+        highest: f64,
+        /// The time that was asked for, minutes.
+        asked: f64,
+    },
     /// The machine cannot run a toolpath.
     #[error("{scene}: the machine cannot run the toolpath \"{name}\": {reason}")]
     #[diagnostic(help("change [machine.kinematics] or that [[toolpath]] in the scene"))]
@@ -193,6 +210,10 @@ impl JobError {
     pub fn why_not_planned(&self) -> Option<String> {
         match self {
             Self::Plan { reason, .. } => Some(reason.to_string()),
+            Self::TooLittleTime { least, highest, asked, .. } => Some(format!(
+                "it takes {least:.2} minutes or more, at scallops of {highest} mm already, and {asked} were asked for; write larger \
+                 `minutes` in [compare]"
+            )),
             Self::Machine { reason, .. } => Some(format!("the machine cannot run it: {reason}")),
             _ => None,
         }

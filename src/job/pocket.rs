@@ -69,7 +69,7 @@ pub(crate) fn pocket_figures(
         wall_gouge_error_bound_mm: off + (most - gouge.depth),
         wall_gouge_move: gouge.move_index,
         wall_gouge_of_cells_mm: of_cells,
-        wall_gouge_of_cells_error_bound_mm: std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,
+        wall_gouge_of_cells_error_bound_mm: off + std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,
         wall_gouge_area_mm2: area,
         wall_uncut_mm: left.thickness,
         wall_uncut_error_bound_mm: Some(left.error_bound + off).filter(|bound| bound.is_finite()),

@@ -134,7 +134,7 @@ fn comparison(report: &RunReport) -> Markup {
                         td { (micrometres(t.scallop.p50_mm)) }
                         td { (per_cent(t.scallop.over_target_fraction)) }
                         td { (format!("{:.2}", t.uncut.area_mm2)) }
-                        td { (with_bound(Some(t.gouge.max_depth_mm), Some(t.gouge.error_bound_mm))) }
+                        td { (of_deepest_cut(t)) }
                         td { (badge(t.verdict)) }
                     }
                 }
@@ -295,6 +295,11 @@ fn highest_material(excess: &ExcessFigures) -> String {
     };
     let highest = &excess.highest;
     format!("{} µm, {what}", with_bound(Some(highest.max_mm), Some(highest.error_bound_mm)))
+}
+
+fn of_deepest_cut(t: &ToolpathResult) -> String {
+    let [depth, bound] = t.deepest_cut();
+    with_bound(Some(depth), Some(bound))
 }
 
 fn figures(t: &ToolpathResult) -> Markup {

@@ -10,6 +10,9 @@ use metrology::{
     UncutFigures,
 };
 
+/// The claim that no wall of a pocket is cut.
+pub const WALL: &str = "wall";
+
 /// How a toolpath was cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulationFigures {
@@ -87,6 +90,16 @@ impl ToolpathResult {
     /// The limits of which that is the verdict.
     pub fn claims_that(&self, verdict: Verdict) -> impl Iterator<Item = &Claim> {
         self.claims.iter().filter(move |claim| claim.verdict() == verdict)
+    }
+
+    /// The deepest cut and its bound, mm: into the surface or, in a pocket, beyond its walls, which have a limit of their own.
+    pub fn deepest_cut(&self) -> [f64; 2] {
+        let walls = self.claims.iter().filter(|claim| claim.what == WALL);
+        let mut all: Vec<[f64; 2]> =
+            walls.filter_map(|claim| Some([claim.measured?, claim.error_bound])).collect();
+        all.push([self.gouge.max_depth_mm, self.gouge.error_bound_mm]);
+        let deepest = all.iter().map(|cut| cut[0]).fold(0.0, f64::max);
+        [deepest, all.iter().map(|cut| (cut[0] - deepest) + cut[1]).fold(0.0, f64::max)]
     }
 
     /// What share of the surface the verdict covers, in words to stand behind it; empty where that is all of it.

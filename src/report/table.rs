@@ -67,6 +67,7 @@ fn row(out: &mut String, cells: [&str; 11]) -> std::fmt::Result {
 
 fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
     let scallop = &t.scallop;
+    let [depth, bound] = t.deepest_cut();
     row(
         out,
         [
@@ -79,7 +80,7 @@ fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
             &micrometres(scallop.p50_mm),
             &per_cent(scallop.over_target_fraction),
             &format!("{:.2}", t.uncut.area_mm2),
-            &with_bound(Some(t.gouge.max_depth_mm), Some(t.gouge.error_bound_mm)),
+            &with_bound(Some(depth), Some(bound)),
             t.verdict.word(),
         ],
     )
@@ -221,6 +222,8 @@ pub fn conclusion(report: &RunReport) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::fixture;
+    use super::super::result::WALL;
+    use super::super::verdict::{Claim, Gravity};
     use super::*;
 
     #[test]
@@ -234,6 +237,23 @@ mod tests {
         assert_eq!(with_bound(Some(0.0194), Some(1e-9)), "19.4 ± 0.01");
         assert_eq!(with_bound(Some(0.0194), Some(0.01234)), "19.4 ± 12.4");
         assert_eq!(with_bound(Some(0.0), Some(0.0)), "0.00 ± 0.00");
+    }
+
+    /// Walls of pockets count as the surface does, with the bound of what their chords are off.
+    #[test]
+    fn cuts_beyond_walls_count_in_the_table() {
+        let mut report = fixture::report();
+        let Some(super::super::result::ToolpathReport::Measured(first)) = report.toolpaths.first_mut() else {
+            panic!("it was measured")
+        };
+        let [depth, bound] = [first.gouge.max_depth_mm, first.gouge.error_bound_mm];
+        assert_eq!(first.deepest_cut(), [depth, bound]);
+        let claim = |measured, bound| Claim::length(WALL, Gravity::Scrap, 0.5, measured, bound);
+        first.claims.push(claim(0.25, 0.125));
+        assert_eq!(first.deepest_cut(), [0.25, 0.125]);
+        first.claims.push(claim(0.0, 0.5));
+        assert_eq!(first.deepest_cut(), [0.25, 0.25]);
+        assert!(result_table(&report).contains("250 ± 250"));
     }
 
     #[test]

@@ -26,6 +26,19 @@ pub enum ScallopError {
         /// Twice that.
         diameter: f64,
     },
+    /// A cutter that is no ball does not fit.
+    #[error(
+        "the cutter has a radius of {radius:.4} mm across the feed there, and does not fit into a concave section of radius {section} mm: \
+         the machinable limit; {cure}"
+    )]
+    CutterDoesNotFit {
+        /// Radius that the cutter shows across the feed, mm.
+        radius: f64,
+        /// Radius of the section, mm.
+        section: f64,
+        /// What would fit.
+        cure: String,
+    },
     /// The two passes leave untouched material between them.
     #[error(
         "passes {step} mm apart leave material that no pass touches: a ball of radius {ball} mm reaches across \

@@ -5,7 +5,7 @@ use io::MeshFormat;
 use keys::SceneError;
 
 use crate::named_file::NamedFile;
-use crate::part::{FLATTEN_SHARE, LoadError, Loaded, Loading, read_mesh};
+use crate::part::{LoadError, Loaded, Loading, flattening, read_mesh};
 use crate::{Scene, StockRequest};
 
 fn loading(scene: &Scene) -> Loading<'_> {
@@ -13,7 +13,7 @@ fn loading(scene: &Scene) -> Loading<'_> {
         source: &scene.source,
         cutter: &scene.cutter,
         chord_tolerance: scene.tolerance.chord,
-        flattening: FLATTEN_SHARE * scene.tolerance.chord.min(scene.tolerance.gouge),
+        flattening: flattening(&scene.tolerance),
         margin: match scene.stock {
             StockRequest::Around { margin, .. } => Some(margin),
             _ => None,

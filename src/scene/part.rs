@@ -13,7 +13,7 @@ pub use formula::FormulaSource;
 pub use mesh::MeshFile;
 pub(crate) use mesh::read_mesh;
 pub use nurbs::NurbsSource;
-pub(crate) use pocket::FLATTEN_SHARE;
+pub(crate) use pocket::flattening;
 pub use pocket::{EarlierCutter, OpenLine, OutlineSource, PocketSource, unmeasured_beside_walls};
 pub(crate) use source::Loading;
 pub use source::{LoadError, Loaded};

@@ -309,3 +309,35 @@ fn ways_down_through_air_may_be_steep() {
     let (code, stepped) = judged(home.path(), &allowed);
     assert_eq!((code, violations(&stepped)), (Some(0), Vec::new()));
 }
+
+/// Chords of a drawn curve cut its inside, and beside an island of a drawing the cutter comes so much nearer: the bound holds it, the table
+/// tells it, and it stays far below the limit.
+#[test]
+fn what_chords_of_drawings_are_off_is_in_the_bounds() {
+    let home = tempfile::tempdir().unwrap();
+    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"60mm\" height=\"60mm\" viewBox=\"0 0 60 60\">\
+               <rect x=\"5\" y=\"5\" width=\"50\" height=\"50\"/><circle cx=\"30\" cy=\"30\" r=\"18\"/></svg>";
+    fs::write(home.path().join("island.svg"), svg).unwrap();
+    let text = "[part]\nsurface = \"pocket\"\nfile = \"island.svg\"\ndepth = 2\n[cutter]\nshape = \"flat\"\ndiameter = 4\n[tolerance]\n\
+                chord = 0.005\ngouge = 0.005\n[[toolpath]]\nstrategy = \"pocket-offset\"\n";
+    let (toolpath, files) = run(home.path(), "island", text);
+    let program = fs::read(files.join("toolpath.nc")).unwrap();
+    let path = path_of(&read_gcode("toolpath.nc", &program, GENERAL_CONTROL, &Setup::default()).unwrap());
+    let centre = Point3::new(30.0, 30.0, -2.0);
+    let fed = path.segments().filter(|(_, _, m)| m.kind == MoveKind::Cut);
+    let away = |(a, b): (Point3, Point3)| {
+        let (along, from) = ((b - a).xy(), (centre - a).xy());
+        let share = if along.norm() > 0.0 { from.dot(&along) / along.norm_squared() } else { 0.0 };
+        (from - along * share.clamp(0.0, 1.0)).norm()
+    };
+    let nearest = fed.map(|(a, b, _)| away((a, b))).fold(f64::INFINITY, f64::min);
+    let cut = 18.0 + 2.0 - nearest;
+    let figure = |key: &str| toolpath["pocket"][key].as_f64().unwrap();
+    let (depth, bound) = (figure("wall_gouge_mm"), figure("wall_gouge_error_bound_mm"));
+    assert!(cut > 1e-4 && cut <= depth + bound, "{cut} {depth} {bound}");
+    assert!(bound <= 0.1 * 0.005, "{bound}");
+    let answer = millstream(home.path(), &["run", "island.toml", "--out", "again"]);
+    let row = answer.stdout.lines().find(|line| line.starts_with("pocket-offset ")).unwrap().to_owned();
+    let told = row.split(" ± ").last().and_then(|rest| rest.split(' ').next()).unwrap();
+    assert!(told.parse::<f64>().unwrap() >= 1e3 * (cut - depth) - 0.01, "{row}");
+}

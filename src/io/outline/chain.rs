@@ -18,16 +18,17 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
     let mut closed = Vec::new();
     let mut open: Vec<Drawn> = Vec::new();
     for mut d in drawn {
-        d.points.dedup();
-        if d.points.len() > 1
-            && !d.closed
-            && gap(&d.points[0], &d.points[d.points.len() - 1]) <= JOIN_TOLERANCE
-            && d.points.len() > 3
-        {
-            d.points.pop();
-            d.closed = true;
+        let chords = &mut d.chords;
+        chords.points.dedup();
+        if !chords.closed && chords.points.len() > 3 {
+            let between = gap(&chords.points[0], &chords.points[chords.points.len() - 1]);
+            if between <= JOIN_TOLERANCE {
+                chords.points.pop();
+                chords.closed = true;
+                chords.off_curve += between;
+            }
         }
-        match (d.closed, d.points.len()) {
+        match (d.chords.closed, d.chords.points.len()) {
             (true, _) => closed.push(d),
             (false, 0 | 1) => notes.push(format!("{} has no length and is left out", d.name())),
             (false, _) => open.push(d),
@@ -35,12 +36,17 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
     }
     let (mut joined, mut widest) = (0usize, 0.0f64);
     while let Some(mut chain) = (!open.is_empty()).then(|| open.remove(0)) {
-        let first = chain.points[0];
+        let first = chain.chords.points[0];
+        // The end of one piece moves to that of the other, and its chord with it.
+        let mut moved = 0.0f64;
         loop {
-            let end = chain.points[chain.points.len() - 1];
+            let end = chain.chords.points[chain.chords.points.len() - 1];
             // Of all ends within the tolerance the nearest; its own beginning closes the chain.
             let ends = open.iter().enumerate().flat_map(|(k, d)| {
-                [(gap(&end, &d.points[0]), k, false), (gap(&end, &d.points[d.points.len() - 1]), k, true)]
+                [
+                    (gap(&end, &d.chords.points[0]), k, false),
+                    (gap(&end, &d.chords.points[d.chords.points.len() - 1]), k, true),
+                ]
             });
             let next = ends.fold(None, |best: Option<(f64, usize, bool)>, e| match best {
                 Some(b) if b.0 <= e.0 => Some(b),
@@ -48,10 +54,14 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
             });
             let to_first = gap(&end, &first);
             let near = next.filter(|n| n.0 <= JOIN_TOLERANCE);
-            if chain.points.len() > 2 && to_first <= JOIN_TOLERANCE && near.is_none_or(|n| to_first <= n.0) {
+            if chain.chords.points.len() > 2
+                && to_first <= JOIN_TOLERANCE
+                && near.is_none_or(|n| to_first <= n.0)
+            {
                 widest = widest.max(to_first);
-                chain.points.pop();
-                chain.closed = true;
+                moved = moved.max(to_first);
+                chain.chords.points.pop();
+                chain.chords.closed = true;
                 break;
             }
             let Some((distance, k, backwards)) = near else {
@@ -59,9 +69,9 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
                     || format!("its other end is {to_first:.4} mm away"),
                     |n| {
                         let at = if n.2 {
-                            open[n.1].points[open[n.1].points.len() - 1]
+                            open[n.1].chords.points[open[n.1].chords.points.len() - 1]
                         } else {
-                            open[n.1].points[0]
+                            open[n.1].chords.points[0]
                         };
                         if n.0 < to_first {
                             format!(
@@ -87,13 +97,15 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
                     ),
                 ));
             };
-            let mut piece = open.remove(k).points;
+            let mut piece = open.remove(k).chords;
             if backwards {
-                piece.reverse();
+                piece.points.reverse();
             }
-            (joined, widest) = (joined + 1, widest.max(distance));
-            chain.points.extend(piece.into_iter().skip(1));
+            (joined, widest, moved) = (joined + 1, widest.max(distance), moved.max(distance));
+            chain.chords.off_curve = chain.chords.off_curve.max(piece.off_curve);
+            chain.chords.points.extend(piece.points.into_iter().skip(1));
         }
+        chain.chords.off_curve += moved;
         closed.push(chain);
     }
     if widest > ROUNDING {

@@ -1,14 +1,15 @@
 //! DXF, the text form: pairs of a group code and a value (Autodesk DXF reference, AC1009 to AC1032).
 //!
 //! Read are LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE and POLYLINE with bulges, and SPLINE by control points,
-//! of model space, in the plane z = const seen from above or below. Other entities are named in a note;
-//! inserted blocks are refused, since geometry may hide in them.
+//! of model space, in the plane z = const seen from above or below. Other entities are named in a note, and so are those that are
+//! left out because they are invisible or on a layer that is frozen or off; inserted blocks are refused, since geometry may hide
+//! in them, and so are entities whose z varies.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::curve::{Spline, ellipse};
-use super::{Drawn, OutlineError, OutlineFormat, OutlineOptions};
+use super::curve::Spline;
+use super::{Chords, Drawn, OutlineError, OutlineFormat, OutlineOptions};
 use geometry::{Point2, Vector2};
 
 /// AutoCAD DXF as text.
@@ -16,6 +17,9 @@ pub const FORMAT: OutlineFormat = OutlineFormat { extension: "dxf", parse };
 
 /// Most vertices of one entity.
 const MAX_VERTICES: usize = 1_000_000;
+
+/// Heights of an outline that differ by no more are level, units of the drawing: decimals of the file.
+const LEVEL: f64 = 1.0e-6;
 
 /// `$INSUNITS` in mm.
 const UNITS: [(i64, f64); 8] =
@@ -74,6 +78,40 @@ impl Entity<'_> {
         self.text(70).and_then(|t| t.parse().ok()).unwrap_or(0)
     }
 
+    fn is_invisible(&self) -> bool {
+        self.text(60).and_then(|t| t.parse().ok()).unwrap_or(0i64) == 1
+    }
+
+    /// The height at which it lies, seen from above, in units of the drawing.
+    ///
+    /// # Errors
+    /// Where it does not lie at one height: all that counts is its plan view, which is not what was drawn.
+    fn height(&self) -> Result<f64, OutlineError> {
+        // Where an entity lies in a plane of its own, heights count along its normal.
+        let (codes, sign): (&[i32], f64) = match self.name {
+            "LINE" => (&[30, 31], 1.0),
+            "SPLINE" | "ELLIPSE" | "VERTEX" => (&[30], 1.0),
+            "LWPOLYLINE" => (&[38], self.mirror()?),
+            _ => (&[30], self.mirror()?),
+        };
+        let mut heights = Vec::new();
+        for code in codes {
+            let of = self.all(*code)?;
+            // What is not stated lies at zero.
+            heights.extend(if of.is_empty() { vec![0.0] } else { of });
+        }
+        let [least, most] =
+            heights.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(*z), b.max(*z)]);
+        let rise = if self.name == "ELLIPSE" { self.number(31)?.unwrap_or(0.0).abs() } else { 0.0 };
+        if most - least > LEVEL || rise > LEVEL {
+            return Err(self.fault(format!(
+                "its z varies from {least} to {}; draw outlines at one height",
+                most.max(least + rise)
+            )));
+        }
+        Ok(sign * least)
+    }
+
     /// −1 where the entity's own plane is seen from below, so that its x runs the other way.
     fn mirror(&self) -> Result<f64, OutlineError> {
         let normal = [
@@ -112,6 +150,29 @@ fn pairs(text: &str) -> Result<Vec<CodePair<'_>>, OutlineError> {
     Ok(all)
 }
 
+/// Names of the layers that are frozen or off, lower case: names of layers are compared so.
+fn hidden_layers(pairs: &[CodePair<'_>]) -> Vec<String> {
+    let is = |p: &CodePair<'_>, code: i32, value: &str| p.code == code && p.value == value;
+    let Some(from) = pairs.windows(2).position(|w| is(&w[0], 0, "SECTION") && is(&w[1], 2, "TABLES")) else {
+        return Vec::new();
+    };
+    let body = &pairs[from + 2..];
+    let body = &body[..body.iter().position(|p| is(p, 0, "ENDSEC")).unwrap_or(body.len())];
+    let starts: Vec<usize> = (0..body.len()).filter(|&k| body[k].code == 0).collect();
+    let entries = starts.iter().enumerate().filter(|(_, k)| body[**k].value == "LAYER").map(|(n, &k)| {
+        let end = starts.get(n + 1).copied().unwrap_or(body.len());
+        &body[k + 1..end]
+    });
+    let number = |entry: &[CodePair<'_>], code: i32| -> i64 {
+        entry.iter().find(|p| p.code == code).and_then(|p| p.value.parse().ok()).unwrap_or(0)
+    };
+    // The first bit freezes a layer, and a colour below zero turns it off.
+    entries
+        .filter(|entry| number(entry, 70) & 1 == 1 || number(entry, 62) < 0)
+        .filter_map(|entry| entry.iter().find(|p| p.code == 2).map(|p| p.value.to_lowercase()))
+        .collect()
+}
+
 /// The drawn entities, mm.
 fn parse(
     bytes: &[u8],
@@ -134,6 +195,15 @@ fn parse(
     let mut drawn = Vec::new();
     let mut ignored: BTreeMap<&str, usize> = BTreeMap::new();
     let mut other_layers = 0usize;
+    let hidden_layers = hidden_layers(&pairs);
+    let (mut invisible, mut on_hidden_layers) = (0usize, 0usize);
+    let mut heights: Option<[f64; 2]> = None;
+    if let Some(layer) = options.layer.as_ref().filter(|layer| hidden_layers.contains(&layer.to_lowercase()))
+    {
+        return Err(OutlineError::new(format!(
+            "the layer \"{layer}\" is frozen or off in the drawing; turn it on there, or name another `layer`"
+        )));
+    }
     let mut layers: Vec<&str> = Vec::new();
     let mut k = 0;
     while k < entities.len() {
@@ -160,10 +230,21 @@ fn parse(
             other_layers += 1;
             continue;
         }
+        if entity.is_invisible() {
+            invisible += 1;
+            continue;
+        }
+        if hidden_layers.contains(&layer.to_lowercase()) {
+            on_hidden_layers += 1;
+            continue;
+        }
         match draw(entity, vertices, tolerance)? {
-            Some((mut points, closed)) => {
-                points.iter_mut().for_each(|p| *p *= scale);
-                drawn.push(Drawn { points, closed, line: entity.line, entity: entity.name.to_owned() });
+            Some(mut chords) => {
+                let z = scale * entity.height()?;
+                heights = Some(heights.map_or([z; 2], |[least, most]| [z.min(least), z.max(most)]));
+                chords.points.iter_mut().for_each(|p| *p *= scale);
+                chords.off_curve *= scale;
+                drawn.push(Drawn { chords, line: entity.line, entity: entity.name.to_owned() });
             }
             None => *ignored.entry(entity.name).or_default() += 1,
         }
@@ -176,6 +257,17 @@ fn parse(
     }
     if other_layers > 0 {
         notes.push(format!("{other_layers} entities of other layers are left out"));
+    }
+    if invisible > 0 {
+        notes.push(format!("invisible entities, left out: {invisible}"));
+    }
+    if on_hidden_layers > 0 {
+        notes.push(format!("entities on layers that are frozen or off, left out: {on_hidden_layers}"));
+    }
+    if let Some([least, most]) = heights.filter(|[least, most]| most - least > LEVEL * scale) {
+        notes.push(format!(
+            "its outlines lie at heights from z {least} to {most}; all are taken to the floor of the pocket"
+        ));
     }
     for (name, count) in ignored {
         notes.push(format!("{count} {name} left out: not a kind of outline"));
@@ -222,9 +314,9 @@ fn draw(
     entity: &Entity<'_>,
     vertices: &[Entity<'_>],
     tolerance: f64,
-) -> Result<Option<(Vec<Point2>, bool)>, OutlineError> {
+) -> Result<Option<Chords>, OutlineError> {
     let drawn = match entity.name {
-        "LINE" => (vec![entity.point(10)?, entity.point(11)?], false),
+        "LINE" => Chords::open(vec![entity.point(10)?, entity.point(11)?]),
         "CIRCLE" | "ARC" => {
             let (mirror, centre, radius) = (entity.mirror()?, entity.point(10)?, entity.needed(40)?);
             if radius <= 0.0 {
@@ -285,6 +377,10 @@ fn draw(
             let corner = |v: &Entity<'_>| Ok((v.point(10)?, v.number(42)?.unwrap_or(0.0)));
             // The frame's control points are for editing; the curve itself stands beside them.
             let on_curve = vertices.iter().filter(|v| v.flags() & 16 == 0);
+            let heights = on_curve.clone().map(Entity::height).collect::<Result<Vec<f64>, _>>()?;
+            if heights.windows(2).any(|ends| (ends[1] - ends[0]).abs() > LEVEL) {
+                return Err(entity.fault("z varies along it; draw outlines at one height"));
+            }
             let corners = on_curve.map(corner).collect::<Result<_, OutlineError>>()?;
             bulged(entity, corners, entity.flags() & 1 == 1, mirror, tolerance)?
         }
@@ -306,31 +402,25 @@ fn draw(
                 return Err(entity.fault(fault));
             }
             // Whether it is closed shows at its ends.
-            (spline.chords(tolerance), false)
+            spline.chords(tolerance)
         }
         "INSERT" => return Err(entity.fault("inserted blocks are not read; explode them before exporting")),
         _ => return Ok(None),
     };
-    if drawn.0.len() > MAX_VERTICES {
-        return Err(entity.fault(format!("it has {} points", drawn.0.len())));
+    if drawn.points.len() > MAX_VERTICES {
+        return Err(entity.fault(format!("it has {} points", drawn.points.len())));
     }
     Ok(Some(drawn))
 }
 
-fn arc_points(
-    centre: Point2,
-    axes: [Vector2; 2],
-    from: f64,
-    to: f64,
-    tolerance: f64,
-    full: bool,
-) -> (Vec<Point2>, bool) {
-    let mut points = vec![centre + axes[0] * from.cos() + axes[1] * from.sin()];
-    ellipse(centre, axes, from, to, tolerance, &mut points);
+fn arc_points(centre: Point2, axes: [Vector2; 2], from: f64, to: f64, tolerance: f64, full: bool) -> Chords {
+    let mut chords = Chords::open(vec![centre + axes[0] * from.cos() + axes[1] * from.sin()]);
+    chords.ellipse(centre, axes, from, to, tolerance);
     if full {
-        points.pop();
+        chords.points.pop();
+        chords.closed = true;
     }
-    (points, full)
+    chords
 }
 
 /// Corners joined by lines or, where the bulge (a quarter of the angle's tangent) is not zero, by arcs.
@@ -340,16 +430,16 @@ fn bulged(
     closed: bool,
     mirror: f64,
     tolerance: f64,
-) -> Result<(Vec<Point2>, bool), OutlineError> {
+) -> Result<Chords, OutlineError> {
     if corners.iter().any(|(p, _)| p.y.is_nan()) {
         return Err(entity.fault("a corner has no y"));
     }
-    let mut points: Vec<Point2> = corners.first().map(|c| c.0).into_iter().collect();
+    let mut chords = Chords { closed, ..Chords::open(corners.first().map(|c| c.0).into_iter().collect()) };
     let sides = if closed { corners.len() } else { corners.len().saturating_sub(1) };
     for k in 0..sides {
         let ((a, bulge), (b, _)) = (corners[k], corners[(k + 1) % corners.len()]);
         if bulge == 0.0 || a == b {
-            points.push(b);
+            chords.points.push(b);
             continue;
         }
         let (chord, angle) = (b - a, 4.0 * bulge.atan());
@@ -360,14 +450,14 @@ fn bulged(
         if spoke.norm() >= 1e9 {
             return Err(entity.fault(format!("the bulge {bulge} is too large")));
         }
-        ellipse(centre, [spoke, Vector2::new(-spoke.y, spoke.x)], 0.0, angle, tolerance, &mut points);
-        if let Some(last) = points.last_mut() {
+        chords.ellipse(centre, [spoke, Vector2::new(-spoke.y, spoke.x)], 0.0, angle, tolerance);
+        if let Some(last) = chords.points.last_mut() {
             *last = b;
         }
     }
-    if closed && points.len() > 1 {
-        points.pop();
+    if closed && chords.points.len() > 1 {
+        chords.points.pop();
     }
-    points.iter_mut().for_each(|p| p.x *= mirror);
-    Ok((points, closed))
+    chords.points.iter_mut().for_each(|p| p.x *= mirror);
+    Ok(chords)
 }

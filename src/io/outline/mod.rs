@@ -2,7 +2,7 @@
 //!
 //! Enters: a drawing of one of [`OUTLINE_FORMATS`]. Leaves: closed polylines in mm, y up, and the entity that
 //! each came from. Curves are flattened within a chord tolerance; open chains are joined where ends lie
-//! within [`JOIN_TOLERANCE`]. Nothing is left out in silence: what cannot be an outline is refused with
+//! within [`JOIN_TOLERANCE`]. How far the polylines lie off the curves by both is bounded. Nothing is left out in silence: what cannot be an outline is refused with
 //! file, line and place, or named in a note.
 
 mod chain;
@@ -68,7 +68,7 @@ impl OutlineFormat {
 /// How a drawing is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlineOptions {
-    /// Largest distance between a curve and its chords, mm.
+    /// Largest distance between a curve and its chords, mm. What it is at most in the end is known better.
     pub chord_tolerance: f64,
     /// One unit of the drawing in mm; `None`: as the file says (a DXF without units is in mm, an SVG
     /// without them has 96 to the inch).
@@ -97,12 +97,30 @@ impl OutlineError {
     }
 }
 
-/// A polyline of a drawing, mm.
+/// A curve of a drawing as chords, mm.
 #[derive(Debug, Clone, PartialEq)]
-struct Drawn {
+struct Chords {
     points: Vec<Point2>,
     /// Whether the drawing says that the last point is joined to the first.
     closed: bool,
+    /// The curve and its chords lie no farther apart.
+    off_curve: f64,
+}
+
+impl Chords {
+    fn open(points: Vec<Point2>) -> Self {
+        Self { points, closed: false, off_curve: 0.0 }
+    }
+
+    fn closed(points: Vec<Point2>) -> Self {
+        Self { closed: true, ..Self::open(points) }
+    }
+}
+
+/// A polyline of a drawing, and where it has it.
+#[derive(Debug, Clone, PartialEq)]
+struct Drawn {
+    chords: Chords,
     /// Its line in the file and its kind (`LINE`, `circle`).
     line: usize,
     entity: String,
@@ -119,6 +137,8 @@ impl Drawn {
 pub struct Outlines {
     /// The region that they bound: outlines, islands in them, outlines in those.
     pub region: Region,
+    /// The region's border and the curves as they were drawn lie no farther apart, mm.
+    pub off_curves: f64,
     /// What was left out or joined, in words.
     pub notes: Vec<String>,
 }
@@ -148,13 +168,17 @@ pub fn parse(
     let drawn = (format.parse)(bytes, options, &mut notes)?;
     if drawn.is_empty() {
         let place = options.layer.as_ref().map_or_else(String::new, |layer| format!(" on \"{layer}\""));
-        return Err(OutlineError::new(format!("it has no outlines{place}")));
+        // What was left out may be what was meant.
+        let left_out = notes.iter().filter(|note| note.contains("left out")).map(String::as_str);
+        let left_out: String = left_out.map(|note| format!("; {note}")).collect();
+        return Err(OutlineError::new(format!("it has no outlines{place}{left_out}")));
     }
     let closed = chain::join(drawn, &mut notes)?;
     let names: Vec<String> = closed.iter().map(Drawn::name).collect();
-    let curves = closed.into_iter().map(|d| d.points).collect();
+    let off_curves = closed.iter().map(|d| d.chords.off_curve).fold(0.0, f64::max);
+    let curves = closed.into_iter().map(|d| d.chords.points).collect();
     let (region, _) = Region::nested(curves).map_err(|e| blame(&e, &names))?;
-    Ok(Outlines { region, notes })
+    Ok(Outlines { region, off_curves, notes })
 }
 
 fn blame(error: &RegionError, names: &[String]) -> OutlineError {

@@ -161,6 +161,198 @@ fn what_is_wrong_is_told_with_its_place() {
     says(svg("<text>hello</text>"), &["no outlines"]);
 }
 
+fn square(x: f64, also: &str) -> String {
+    format!("<rect x='{x}' y='10' width='20' height='20' {also}/>")
+}
+
+/// Outlines that an SVG hides are left out, and the notes say so.
+#[test]
+fn what_an_svg_hides_is_left_out() {
+    for (also, note) in [
+        ("opacity='0'", "hidden elements, left out: 1"),
+        ("style='opacity:0%'", "hidden elements, left out: 1"),
+        ("style='/* : */ DISPLAY : NONE !important'", "hidden elements, left out: 1"),
+        ("fill-opacity='0'", "neither fill nor stroke"),
+        ("fill='none'", "neither fill nor stroke"),
+        ("fill='#fff0' stroke='red' stroke-opacity='0'", "neither fill nor stroke"),
+        ("style='fill:transparent;stroke:red;stroke-width:0'", "neither fill nor stroke"),
+        ("requiredExtensions='a'", "hidden elements, left out: 1"),
+    ] {
+        for body in [square(50.0, also), format!("<g {also}>{}</g>", square(50.0, ""))] {
+            let found = svg(&(square(10.0, "") + &body)).unwrap();
+            assert_eq!(found.region.area().round(), 100.0, "{body}");
+            assert!(found.notes.join("").contains(note), "{body}: {:?}", found.notes);
+        }
+    }
+    for also in [
+        "opacity='0.1'",
+        "fill='none' stroke='black'",
+        "fill='url(#a)'",
+        "style='display:inline' display='none'",
+    ] {
+        assert_eq!(svg(&square(10.0, also)).unwrap().region.area().round(), 100.0, "{also}");
+    }
+    // Elements of others, and all of a <switch> but the first that applies.
+    let drawn = square(10.0, "");
+    let other = format!("<o:g xmlns:o='urn:other'>{}</o:g>", square(50.0, ""));
+    let switch =
+        format!("<switch><foreignObject requiredExtensions='a'/><g>{drawn}</g>{}</switch>", square(50.0, ""));
+    for body in [format!("{drawn}{other}"), switch] {
+        assert_eq!(svg(&body).unwrap().region.area().round(), 100.0, "{body}");
+    }
+}
+
+#[test]
+fn a_transform_is_about_its_origin() {
+    // One unit is half a millimetre, and the page is 50 mm high.
+    let about = |also: &str| svg(&square(50.0, also)).unwrap().region.bounds().unwrap();
+    let half = 10.0 * 0.5f64.sqrt();
+    for also in [
+        "transform='rotate(45)' transform-origin='60 20'",
+        "transform='rotate(45)' style='transform-origin: 60px 20px'",
+        "transform='translate(60 20) rotate(45) translate(-60 -20)'",
+    ] {
+        let [lo, hi] = about(also);
+        assert!((lo - Point2::new(30.0 - half, 40.0 - half)).norm() < 1e-9, "{also}: {lo}");
+        assert!((hi - Point2::new(30.0 + half, 40.0 + half)).norm() < 1e-9, "{also}: {hi}");
+    }
+    assert_eq!(about("transform-origin='center'"), about(""));
+}
+
+/// Shapes that are seen otherwise than they are written are refused with element, line and cure.
+#[test]
+fn what_changes_an_svg_and_is_not_read_is_refused() {
+    let says = |body: &str, words: &[&str]| {
+        let text = svg(&format!("{}\n{body}", square(10.0, ""))).unwrap_err().to_string();
+        assert!(words.iter().all(|w| text.contains(w)), "{body}: {text}");
+    };
+    for (also, word) in [
+        ("clip-path='url(#c)'", "`clip-path`"),
+        ("style='clip-path:inset(0 5px 0 0)'", "`clip-path`"),
+        ("mask='url(#c)'", "`mask`"),
+        ("style='filter: drop-shadow(1px 2px 3px red)'", "`filter`"),
+        ("systemLanguage='de'", "`systemLanguage`"),
+    ] {
+        says(&square(50.0, also), &["line 2", "rect", word]);
+        says(&format!("<g id='a' {also}>{}</g>", square(50.0, "")), &["line 2", "g \"a\"", word]);
+    }
+    for (also, word) in [
+        ("style='translate:9px'", "`translate`"),
+        ("style='offset-path:ray(0deg)'", "`offset-path`"),
+        ("style='animation:a 2s'", "`animation`"),
+        ("transform='rotate(9)' transform-origin='center'", "two numbers"),
+        ("transform='rotate(9)' transform-box='fill-box'", "`transform-box`"),
+        ("opacity='var(--a)'", "not a number"),
+        ("display='var(--a)'", "write a word"),
+    ] {
+        says(&square(50.0, also), &["line 2", "rect", word]);
+    }
+    says(&format!("<switch><g systemLanguage='xx'>{}</g></switch>", square(50.0, "")), &["`systemLanguage`"]);
+    says("<rect width='9' height='9'><animate attributeName='x' to='70'/></rect>", &["rect", "<animate>"]);
+    says("<g><set attributeName='display' to='none'/><rect width='9' height='9'/></g>", &["<set>"]);
+    says("<set href='#a' attributeName='display' to='none'/>", &["another element"]);
+    for rule in [
+        "opacity:0",
+        "clip-path:none;mask:url(#a)",
+        "filter:blur(9px)",
+        "fill:none;stroke:none",
+        "transform-origin:5px 5px",
+    ] {
+        says(&format!("<g display='none'><style>.a{{{rule}}}</style></g>"), &["style", "presentation"]);
+    }
+    let page = |also: &str, scale| {
+        let text = format!("<svg width='100mm' viewBox='0 0 200 100' {also}>{}</svg>", square(10.0, ""));
+        parse(text.as_bytes(), svg::FORMAT, &OutlineOptions { scale, ..options() })
+    };
+    for (also, word) in [
+        ("transform='rotate(9)'", "`transform`"),
+        ("style='width:50mm'", "`width`"),
+        ("clip-path='url(#c)'", "`clip-path`"),
+        ("display='none'", "hidden"),
+    ] {
+        assert!(page(also, None).unwrap_err().to_string().contains(word), "{also}");
+    }
+    assert!(page("style='width:50mm'", Some(0.5)).is_ok() && page("style='width:100%'", None).is_ok());
+    let wanted = OutlineOptions { layer: Some("cut".into()), ..options() };
+    let hidden = format!("<svg><g opacity='0'><g id='cut'>{}</g></g></svg>", square(10.0, ""));
+    let error = parse(hidden.as_bytes(), svg::FORMAT, &wanted).unwrap_err().to_string();
+    assert!(error.contains("g \"cut\": it is hidden"), "{error}");
+    // What is not of the wanted layer may be clipped.
+    let other = format!("<svg><g id='cut'>{0}</g><g clip-path='url(#c)'>{0}</g></svg>", square(10.0, ""));
+    assert!(parse(other.as_bytes(), svg::FORMAT, &wanted).is_ok());
+}
+
+#[test]
+fn markers_are_named() {
+    let notes = svg(&square(10.0, "style='marker-mid:url(#m)'")).unwrap().notes;
+    assert!(notes.iter().any(|note| note.contains("1 <marker> left out")), "{notes:?}");
+}
+
+const SQUARE: &str = "90 4 70 1 10 0 20 0 10 10 20 0 10 10 20 10 10 0 20 10";
+
+fn with_layers(entities: &str) -> String {
+    let layers = "0 TABLE 2 LAYER 70 3 0 LAYER 2 0 70 0 62 7 0 LAYER 2 Frozen 70 1 62 7 0 LAYER 2 off 70 4 62 -7 0 ENDTAB";
+    let text = format!("0 SECTION 2 TABLES {layers} 0 ENDSEC 0 SECTION 2 ENTITIES {entities} 0 ENDSEC 0 EOF");
+    text.split_whitespace().collect::<Vec<_>>().join("\n")
+}
+
+/// What a DXF does not show is left out, inserted blocks among it, and the notes say how much.
+#[test]
+fn what_a_dxf_hides_is_left_out() {
+    let hidden = "0 CIRCLE 8 0 60 1 10 40 20 0 40 5 0 CIRCLE 8 FROZEN 10 40 20 0 40 5 0 INSERT 8 off 2 a 0 CIRCLE 8 off 10 4 20 0 40 5";
+    let text = with_layers(&format!("0 LWPOLYLINE 8 0 {SQUARE} {hidden}"));
+    let read = |text: &str, layer: Option<&str>| {
+        parse(text.as_bytes(), dxf::FORMAT, &OutlineOptions { layer: layer.map(str::to_owned), ..options() })
+    };
+    let found = read(&text, None).unwrap();
+    assert_eq!(found.region.area(), 100.0);
+    let notes = found.notes.join("\n");
+    assert!(
+        notes.contains("invisible entities, left out: 1") && notes.contains("off, left out: 3"),
+        "{notes}"
+    );
+    let refused = read(&text, Some("Off")).unwrap_err().to_string();
+    assert!(refused.contains("\"Off\" is frozen or off"), "{refused}");
+    let none = read(&with_layers("0 CIRCLE 8 0 60 1 10 40 20 0 40 5"), None).unwrap_err().to_string();
+    assert!(none.contains("no outlines; invisible entities, left out: 1"), "{none}");
+}
+
+#[test]
+fn outlines_that_are_not_level_are_refused_or_told() {
+    for entity in [
+        "0 LINE 8 0 10 0 20 0 30 0 11 10 21 0 31 3",
+        "0 LINE 8 0 10 0 20 0 30 3 11 10 21 0",
+        "0 SPLINE 8 0 71 1 40 0 40 0 40 1 40 1 10 0 20 0 30 0 10 8 20 5 30 2",
+        "0 ELLIPSE 8 0 10 0 20 0 11 20 21 0 31 1 40 0.5",
+        "0 POLYLINE 8 0 70 1 0 VERTEX 10 0 20 0 30 0 0 VERTEX 10 9 20 0 30 1 0 VERTEX 10 9 20 9 30 0 0 SEQEND",
+    ] {
+        let refused = from_dxf(entity).unwrap_err().to_string();
+        assert!(refused.contains("line 15") && refused.contains("one height"), "{entity}: {refused}");
+    }
+    let level = |z: f64| format!("0 LWPOLYLINE 8 0 38 {z} {SQUARE} 0 CIRCLE 8 0 10 5 20 5 30 -5 230 -1 40 1");
+    assert!(from_dxf(&level(5.0)).is_ok());
+    let notes = from_dxf(&level(2.0).replace("230 -1 ", "")).unwrap().notes;
+    assert!(notes.join("").contains("from z -5 to 2"), "{notes:?}");
+}
+
+/// The bound of an outline holds what its chords are off the curves, in mm whatever the unit, and the gaps that were closed.
+#[test]
+fn outlines_have_a_bound_of_what_they_are_off_the_drawing() {
+    let of = |outlines: Result<Outlines, OutlineError>| outlines.unwrap().off_curves;
+    assert_eq!(of(svg(&square(10.0, ""))), 0.0);
+    let island = svg("<rect width='100' height='90'/><circle cx='50' cy='50' r='40'/>").unwrap();
+    let sagitta = |region: &Region| {
+        let chords = region.curves().find(|curve| curve.len() > 4).unwrap();
+        20.0 - (nalgebra::center(&chords[0], &chords[1]) - Point2::new(25.0, 25.0)).norm()
+    };
+    assert!((sagitta(&island.region) - island.off_curves).abs() < 1e-12 && island.off_curves > 5e-4);
+    let inches = dxf("0 CIRCLE 8 0 10 0 20 0 40 2").replace("$INSUNITS\n70\n4", "$INSUNITS\n70\n1");
+    let off = of(parse(inches.as_bytes(), dxf::FORMAT, &options()));
+    assert!(off > 5e-4 && off <= 1e-3, "{off}");
+    let gap = "0 LINE 8 0 10 0 20 0 11 20 21 0 0 LINE 8 0 10 20 20 0.004 11 20 21 9 0 LINE 8 0 10 20 20 9 11 0 21 0.003";
+    assert!((of(from_dxf(gap)) - 0.004).abs() < 1e-12);
+}
+
 proptest! {
     /// Mutated drawings are read or refused, never a panic.
     #[test]

@@ -2,7 +2,7 @@
 
 use metrology::{EngagementFigures, ExceedingStretch, PocketFigures, StockBefore, View};
 use motion::{MoveKind, Toolpath};
-use report::{Claim, Figure, FigureTable, Gravity, micrometres, with_bound};
+use report::{Claim, Figure, FigureTable, Gravity, WALL, micrometres, with_bound};
 use toolpath::{Pocket, PocketStrategy};
 use work::monitor::Monitor;
 
@@ -138,7 +138,7 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
         run.program_line(index)
     );
     let at_least = Some(pocket.wall_gouge_mm - off(run));
-    Claim { at_least, ..Claim::length("wall", Gravity::Scrap, limit, measured, bound) }.told(text)
+    Claim { at_least, ..Claim::length(WALL, Gravity::Scrap, limit, measured, bound) }.told(text)
 }
 
 /// How far walls and moves may lie off those that were measured, mm.

@@ -19,9 +19,16 @@ use crate::named_file::NamedFile;
 /// The word for `surface`.
 const SURFACE: &str = "pocket";
 
-/// Share of the chord tolerance, and of the gouge tolerance where that is smaller, that drawings are flattened to: passes have the rest of
-/// the one, and verdicts that of the other.
-pub(crate) const FLATTEN_SHARE: f64 = 0.5;
+/// Share of the chord tolerance that drawings are flattened to: passes have the rest ...
+const OF_CHORD: f64 = 0.5;
+
+/// ... and no more than this share of the gouge tolerance: the bounds of walls have what chords are off the curves.
+const OF_GOUGE: f64 = 0.1;
+
+/// The distance within which the chords of drawings lie off their curves, mm.
+pub(crate) fn flattening(tolerance: &metrology::Limits) -> f64 {
+    (OF_CHORD * tolerance.chord).min(OF_GOUGE * tolerance.gouge)
+}
 
 /// The floor is measured up to this many chord tolerances from its walls, where chords of the last pass
 /// leave as much ...
@@ -293,7 +300,7 @@ impl PocketSource {
                     job.source.error(file.span.clone(), message, "mend that file or name another one")
                 })?;
                 let notes = read.notes.iter().map(|note| format!("{}: {note}", file.written)).collect();
-                (read.region, notes, job.flattening)
+                (read.region, notes, read.off_curves)
             }
             OutlineSource::Points { curves } => {
                 let region = Region::nested(curves.clone()).map_err(|e| self.refused(job, &e.to_string()))?.0;

@@ -14,7 +14,7 @@ const ARC_SHARE: f64 = 0.5;
 /// A way down begins this far above the stock that is left, mm: rapids end there.
 const ABOVE: f64 = 0.5;
 
-/// A ramp shorter than this, mm, is a plunge.
+/// A ramp shorter than this, mm, goes on along its run, and is a plunge where that is no longer.
 const LEAST_RAMP: f64 = 0.5;
 
 /// Depths and ways below which a difference is rounding, mm.
@@ -162,6 +162,22 @@ pub(super) fn program(
     Toolpath::new(ClPoint::upright(start), writer.moves)
 }
 
+fn length(way: &[Point2]) -> f64 {
+    way.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+}
+
+/// From the beginning of a way along as much of it as is `far`, mm, and back.
+fn back_and_forth(way: &[Point2], far: f64) -> Vec<Point2> {
+    let mut gone = 0.0;
+    let sides = way.windows(2).take_while(|w| {
+        let before = gone;
+        gone += (w[1] - w[0]).norm();
+        before < far
+    });
+    let forth: Vec<Point2> = way.iter().take(1).copied().chain(sides.map(|w| w[1])).collect();
+    forth.iter().chain(forth.iter().rev().skip(1)).copied().collect()
+}
+
 /// Tips from `above` down to where a run begins.
 fn way_down(
     run: &Run,
@@ -180,10 +196,13 @@ fn way_down(
             turn.push(turn[0]);
             turn
         }
+        Entry::Ramp(way) if length(way) < LEAST_RAMP => {
+            back_and_forth(&run.points, 0.5 * drop / strategy.ramp_angle.tan())
+        }
         Entry::Ramp(way) => way.clone(),
         Entry::Air => return plunge,
     };
-    let length: f64 = once.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    let length = length(&once);
     if length < LEAST_RAMP || drop <= ROUNDING {
         return plunge;
     }
@@ -210,6 +229,37 @@ fn way_down(
 mod tests {
     use super::*;
     use crate::{Pattern, Step};
+
+    /// A short line between islands, from which the run goes on: the way down keeps to the slope of ramps along all of the run.
+    #[test]
+    fn ramps_on_short_lines_go_on_along_the_run() {
+        let points: Vec<Point2> =
+            [(0.0, 0.0), (0.06, 0.0), (0.06, 4.0), (3.0, 4.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
+        let short = vec![points[0], points[1], points[0]];
+        let strategy = PocketStrategy {
+            pattern: Pattern::Zigzag { angle: 0.0 },
+            stepdown: None,
+            floor_allowance: 0.0,
+            wall_allowance: 0.0,
+            wall_finish: WallFinish::Steps,
+            ramp_angle: 3f64.to_radians(),
+            helix_radius: None,
+            engagement: None,
+            gentle: Vec::new(),
+        };
+        let run = Run { entry: Entry::Ramp(short.clone()), points: points.clone() };
+        let tips = way_down(&run, 0.0, -2.0, &strategy, 1e-3);
+        assert_eq!((tips[0], tips[tips.len() - 1]), (Point3::origin(), Point3::new(0.0, 0.0, -2.0)));
+        for w in tips.windows(2) {
+            let slope = (w[0].z - w[1].z).atan2((w[1] - w[0]).xy().norm());
+            assert!(slope <= 3f64.to_radians() + 1e-9, "{} {}", w[0], w[1]);
+        }
+        // No farther than one way of the slope needs, and straight down where the run is as short.
+        let shallow = way_down(&run, 0.0, -0.1, &strategy, 1e-3);
+        assert!(shallow.iter().all(|tip| tip.x <= 0.06), "{shallow:?}");
+        let run = Run { entry: Entry::Ramp(short), points: points[..2].to_vec() };
+        assert_eq!(way_down(&run, 0.0, -2.0, &strategy, 1e-3).len(), 2);
+    }
 
     /// Ways down with sides from micrometres to millimetres, steep and flat, around a helix as well: as the program is written, its
     /// coordinates rounded, no move goes down faster than the plunge rate, and flat ones are fed as fast as passes.
