@@ -936,6 +936,22 @@ mod tests {
         assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
     }
 
+    /// On a slope of one degree the rim of a flat is an arc of r/sin 1° across the feed along the slope: strips of 6.8 mm, and the low edge is cut
+    /// by passes that run on until the rim has left it.
+    #[test]
+    fn a_flat_end_takes_the_strips_that_it_has() {
+        for toolpath in ["iso-scallop", "streamline", "iso-parametric"] {
+            let text = format!(
+                "[part]\nsurface = \"inclined_plane\"\nangle = 1\nx = [0, 40]\ny = [0, 40]\n[cutter]\nshape = \"flat\"\n\
+                 diameter = 20\n[[toolpath]]\nstrategy = \"{toolpath}\"\n"
+            );
+            let session = Session::new(Scene::parse("slope.toml", text).unwrap()).unwrap();
+            let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
+            assert_eq!(result.verdict, report::Verdict::Pass, "{toolpath}: {:?}", result.claims);
+            assert!(result.path.cutting_length_mm < 260.0, "{toolpath}: {}", result.path.cutting_length_mm);
+        }
+    }
+
     /// A spiral leaves a corner of the part by a turn that stands 18 times as high as the target there: no width matters, and a short pass of
     /// its own cuts it.
     #[test]

@@ -14,6 +14,7 @@ use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth
 use crate::levels::spacing::place_levels;
 use crate::levels::{obedience, planned_field, spirals};
 use crate::surface::border::useful_overrun;
+use crate::surface::chart::axis_offset_over;
 use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, STEEPEST_COSINE, not_applicable, reachable};
 use crate::surface::{asked, feed};
 use crate::vocabulary::{
@@ -352,6 +353,27 @@ impl MeshGuide<'_> {
         mixed.try_normalize(1e-9).unwrap_or_else(Vector3::z)
     }
 
+    fn bend(&self, p: &MeshPoint) -> Bend {
+        let corners = self.surface.mesh.triangles()[p.triangle as usize];
+        let mut bend = Bend::default();
+        (0..3).for_each(|k| bend.add(&self.surface.bends[corners[k] as usize], p.weights[k]));
+        bend
+    }
+
+    /// From a contact to the axis, in the plan view.
+    fn axis_offset(&self, p: &MeshPoint) -> Vector2 {
+        let n = self.normal(p);
+        let bends = || {
+            let e1 = n
+                .cross(&Vector3::x())
+                .try_normalize(1e-3)
+                .or_else(|| n.cross(&Vector3::y()).try_normalize(1e-3))?;
+            let (least, most, _) = self.bend(p).principal([e1, n.cross(&e1)]);
+            Some([least, most])
+        };
+        axis_offset_over(&n, bends, self.cutter, self.settings.chord_tolerance)
+    }
+
     /// The place of its weights.
     fn place(&self, p: &MeshPoint) -> Point3 {
         let corners = self.surface.mesh.corners(p.triangle as usize);
@@ -367,7 +389,7 @@ impl MeshGuide<'_> {
         let e2 = self.surface.mesh.area_vector(triangle as usize).try_normalize(1e-300)?.cross(&e1);
         let axis_at = |p: Point3| {
             let at = MeshPoint { triangle, weights: self.on.weights(triangle, &p), position: p };
-            p.coords.xy() + self.cutter.axis_offset(&self.normal(&at))
+            p.coords.xy() + self.axis_offset(&at)
         };
         // How the axis moves with the contact, and so the contact with the axis.
         let here = axis_at(level);
@@ -401,9 +423,7 @@ impl MeshGuide<'_> {
         let gradient = self.on.gradient(p);
         let gradient = gradient - normal * normal.dot(&gradient);
         let across = gradient.try_normalize(1e-300)?;
-        let corners = self.surface.mesh.triangles()[p.triangle as usize];
-        let mut bend = Bend::default();
-        (0..3).for_each(|k| bend.add(&self.surface.bends[corners[k] as usize], p.weights[k]));
+        let bend = self.bend(p);
         let step = self.settings.step;
         let (width, too_concave) = width_at(self.cutter, &normal, &across, &bend, step);
         let width = self.settings.guide().corrected(width, &self.place(p), step);
@@ -418,9 +438,7 @@ impl MeshGuide<'_> {
         let mut knot_of = Vec::with_capacity(curve.points.len() + 1);
         let closing = curve.closed.then(|| curve.points[0]);
         for p in curve.points.iter().copied().chain(closing) {
-            let axis = |p: &MeshPoint| {
-                Point2::from(p.position.coords.xy() + self.cutter.axis_offset(&self.normal(p)))
-            };
+            let axis = |p: &MeshPoint| Point2::from(p.position.coords.xy() + self.axis_offset(p));
             // Where the stretch before it ends; at a crease the cutter then rolls over the edge.
             if let Some(&last) = knots.last() {
                 let end = axis(&self.on.in_triangle(last.triangle, p.position));

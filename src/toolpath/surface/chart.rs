@@ -312,13 +312,11 @@ impl<'a> Chart<'a> {
     /// as far as it does on a plane, but where the slope turns so fast that the axis would swerve or turn back; `chord` mm are no
     /// matter.
     pub fn axis_over(&self, p: &ChartPoint, cutter: &Cutter, chord: f64) -> Vector2 {
-        let flat = cutter.flat_radius();
-        let place = p.jet.p.coords.xy();
-        let down = slope_at(&p.normal, true).filter(|_| flat > 0.0 && !self.is_fitted());
-        let Some((down, _)) = down else { return place + cutter.axis_offset(&p.normal) };
-        let bend = p.curvature_along(&down);
-        let turns = flat * if bend > 0.0 { bend / MOST_BEHIND } else { -bend / MOST_AHEAD };
-        place + cutter.axis_offset_from(&p.normal, turns.max(0.5 * chord / flat))
+        let bends = || {
+            let k = p.jet.principal_curvatures()?;
+            Some([self.sign * k.min, self.sign * k.max])
+        };
+        p.jet.p.coords.xy() + axis_offset_over(&p.normal, bends, cutter, chord)
     }
 
     /// Whether it was fitted to a mesh, on which it does not lie.
@@ -435,6 +433,22 @@ impl<'a> Chart<'a> {
         }
         extent
     }
+}
+
+/// [`Cutter::axis_offset`] on a surface with these principal curvatures, 1/mm, positive concave; `chord` mm are no matter.
+pub fn axis_offset_over(
+    n: &Vector3,
+    bends: impl Fn() -> Option<[f64; 2]>,
+    cutter: &Cutter,
+    chord: f64,
+) -> Vector2 {
+    let flat = cutter.flat_radius();
+    let Some(bends) = Some(()).filter(|()| flat > 0.0).and_then(|()| bends()) else {
+        return cutter.axis_offset(n);
+    };
+    let turns = |bend: f64| flat * if bend > 0.0 { bend / MOST_BEHIND } else { -bend / MOST_AHEAD };
+    let level = bends.map(turns).into_iter().fold(0.5 * chord / flat, f64::max);
+    cutter.axis_offset_from(n, level)
 }
 
 /// Least-squares bicubic height surface over the plan view of a mesh part.
