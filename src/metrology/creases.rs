@@ -216,4 +216,22 @@ mod tests {
         let deepest = all.iter().map(|[found, _]| *found).fold(0.0, f64::max);
         assert!(all.iter().all(|[_, most]| deepest <= *most), "{all:?}");
     }
+
+    /// Faces that meet at a fifteenth of a degree, and a flat end that runs level over their crest: the cut is deepest there, and falls
+    /// off evenly on both sides.
+    #[test]
+    fn a_flat_crest_is_cut_as_deep_on_cells_of_every_size() {
+        let (slope, deep) = (6e-4, 4e-4);
+        let corners =
+            |y: f64| [[-5.0, y, -5.0 * slope], [0.0, y, 0.0], [5.0, y, -5.0 * slope]].map(Point3::from);
+        let points = [corners(0.0), corners(2.4)].concat();
+        let triangles = vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]];
+        let roof = Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0);
+        let pass = [-9.0, 9.0].map(|x| Point3::new(x, 1.2, -deep)).to_vec();
+        for cell in [0.03, 0.07, 0.13, 0.31, 0.5] {
+            let found = gouge_of(&roof, &Cutter::flat(6.0).unwrap(), std::slice::from_ref(&pass), cell);
+            let off = (found.max_depth_mm - deep).abs();
+            assert!(off <= found.error_bound_mm, "{cell}: {off} {}", found.error_bound_mm);
+        }
+    }
 }

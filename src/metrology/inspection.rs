@@ -301,9 +301,9 @@ impl Inspection<'_> {
         let listed = figures.regions.iter().map(|r| r.depth_mm).fold(0.0, f64::max);
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
-        let value = |d: &Deviation, lean: f64, half: f64| self.depth(d, lean, half);
         let known = figures.max_depth_mm;
-        let found = self.between_centres(cells, known, &|k| samples[k], &value, self.creases, monitor)?;
+        let found =
+            self.between_centres(cells, known, &|k| samples[k], &Self::depth, self.creases, monitor)?;
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.at_least_mm = (figures.max_depth_mm - NUMERICAL_FLOOR).max(0.0);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
@@ -327,11 +327,9 @@ impl Inspection<'_> {
     }
 
     /// Depth at a centre, and at most in the square with half side `half` around it. Beside the centre a
-    /// cut may be deeper by the slope times the distance, but the widest cutter, of radius r, that meets the design
-    /// at a slope s cannot go deeper than about s²r below that.
-    fn depth(&self, d: &Deviation, lean: f64, half: f64) -> Value {
-        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutters.greatest_radius());
-        Value { here: -d.distance, possible: -d.distance + deeper }
+    /// cut may be deeper by the slope times the distance: along a move it bends no more than the design does.
+    fn depth(d: &Deviation, lean: f64, half: f64) -> Value {
+        Value { here: -d.distance, possible: -d.distance + d.slope * reach(half, lean) }
     }
 
     /// The greatest value above `known` in the squares of `cells` and those along `creases`, and what may be there at most.
