@@ -88,7 +88,8 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
 fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.uncut;
     let regions = Bounded::new(figures.max_height_mm, figures.error_bound_mm);
-    let all = regions.or(&measured.excess.unreached);
+    // Of equals the one with a place.
+    let all = measured.excess.unreached.or(&regions);
     let Bounded { max_mm: height, error_bound_mm: bound, .. } = all;
     let limit = micrometres(Some(limits.uncut));
     let mut text = if height > 0.0 {
