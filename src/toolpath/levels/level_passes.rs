@@ -211,10 +211,7 @@ impl ChartGuide<'_> {
         let useful = |from: f64, to: f64| {
             let steps = ((to - from).abs() / OVERRUN_STEP).ceil().max(1.0) as usize;
             let place = |k: usize| from + (to - from) * k as f64 / steps as f64;
-            let end = (1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps);
-            // A disc over no part of it does not stand on the chart.
-            let stands = |k: &usize| self.tip(at(place(*k)), &mut Beside::default()).is_some();
-            place((1..=end).rev().find(stands).unwrap_or(0))
+            place((1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps))
         };
         if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
             first.from = useful(first.to, first.from);
