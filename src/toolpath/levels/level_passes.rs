@@ -254,10 +254,11 @@ impl ChartGuide<'_> {
             let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
             let feed = (here.jet.du * du + here.jet.dv * dv).try_normalize(1e-300)?;
             let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            let across = here.cut_across(self.cutter, &feed) * (0.5 * interval);
+            let half = 0.5 * interval;
+            let across = here.cut_across(self.cutter, &feed) * half;
             // The rim of a flat runs back from its foremost place toward the axis.
             let offset = self.axis_over(&here) - here.jet.p.coords.xy();
-            let (arm, half) = (offset.norm(), 0.5 * interval);
+            let arm = offset.norm();
             let back = if self.dropped.flat_radius() > 0.0 && arm > 0.0 {
                 arm - (arm * arm - half * half).max(0.0).sqrt()
             } else {

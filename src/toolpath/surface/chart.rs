@@ -438,12 +438,12 @@ impl<'a> Chart<'a> {
 /// [`Cutter::axis_offset`] on a surface with these principal curvatures, 1/mm, positive concave; `chord` mm are no matter.
 pub fn axis_offset_over(
     n: &Vector3,
-    bends: impl Fn() -> Option<[f64; 2]>,
+    bends: impl FnOnce() -> Option<[f64; 2]>,
     cutter: &Cutter,
     chord: f64,
 ) -> Vector2 {
     let flat = cutter.flat_radius();
-    let Some(bends) = Some(()).filter(|()| flat > 0.0).and_then(|()| bends()) else {
+    let Some(bends) = (flat > 0.0).then(bends).flatten() else {
         return cutter.axis_offset(n);
     };
     let turns = |bend: f64| flat * if bend > 0.0 { bend / MOST_BEHIND } else { -bend / MOST_AHEAD };
