@@ -36,11 +36,20 @@ impl Thin {
         self.other.is_some_and(|other| normal.dot(&other) > SHARP)
     }
 
-    /// The sum of the unit normals of both faces of a sharp ridge, along their middle; `None` between the sides of a thin part, at a wall, and
-    /// where the part bends.
-    pub fn ridge(&self, normal: &Vector3) -> Option<Vector3> {
-        let other = self.other.filter(|_| !self.is_blunt(normal))?;
-        Some(normal + other).filter(leads_out)
+    /// The sums of the unit normals of both faces of a sharp ridge, along their middle; none between the sides of a thin part, at a wall, and
+    /// where the part bends. Of a pointed part with many faces the nearest may be one beside, or one that only bends away: second
+    /// comes the face through which a line along the normal comes out before it is so `deep`, mm.
+    pub fn ridges(
+        &self,
+        part: &Part,
+        point: &Point3,
+        normal: &Vector3,
+        deep: f64,
+        bounding: Bounding<'_>,
+    ) -> impl Iterator<Item = Vector3> {
+        let opposite = comes_out(part, point, normal, -deep).filter(bounding.counts).map(|face| face.normal);
+        let sharp = [self.other, opposite].into_iter().flatten().filter(|other| normal.dot(other) <= SHARP);
+        sharp.map(move |other| normal + other).filter(leads_out)
     }
 }
 
@@ -52,8 +61,13 @@ pub(crate) fn leads_out(sum: &Vector3) -> bool {
 /// Outward unit normal of the face through which a line from a place of the part comes out before it has run so far along a
 /// unit vector, mm; `None` where it ends in the part. What does not go down has not left.
 pub(crate) fn face_before(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<Vector3> {
+    comes_out(part, place, along, way).map(|face| face.normal)
+}
+
+/// As [`face_before`], where on that face.
+fn comes_out(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<SurfacePoint> {
     let (face, distance) = part.closest_point(&(place + along * way));
-    (way < 0.0 && distance > NUMERICAL_FLOOR).then_some(face.normal)
+    (way < 0.0 && distance > NUMERICAL_FLOOR).then_some(face)
 }
 
 /// What part of the surface bounds the solid, besides the place itself.
@@ -111,6 +125,31 @@ mod tests {
     use crate::flat_scene::gouge_of;
     use cutter::Cutter;
     use geometry::{Aabb, TriangleMesh};
+
+    /// A flat end that runs level over the tip of a cone with twelve faces: lines along their normals run out through the faces opposite,
+    /// while the nearest face beside bends away by thirty degrees alone.
+    #[test]
+    fn a_cut_over_the_tip_of_a_cone_is_as_deep_as_the_tip_is_lower() {
+        const FACES: usize = 12;
+        let corner = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / FACES as f64;
+            Point3::new(2.0 * angle.cos(), 2.0 * angle.sin(), -2.0 * 3f64.sqrt())
+        };
+        let points = (0..FACES).map(corner).chain([Point3::origin()]).collect();
+        let triangles = (0..FACES).map(|k| [k, (k + 1) % FACES, FACES].map(|k| k as u32)).collect();
+        let cone = Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0);
+        for deep in [0.02, 0.1] {
+            let pass = [-5.0, 5.0].map(|y| Point3::new(0.3, y, -deep)).to_vec();
+            for cell in [0.1, 0.17] {
+                let found = gouge_of(&cone, &Cutter::flat(6.0).unwrap(), std::slice::from_ref(&pass), cell);
+                let off = (found.max_depth_mm - deep).abs();
+                assert!(
+                    off <= found.error_bound_mm && found.error_bound_mm < 6e-4,
+                    "{deep} {cell}: {found:?}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {

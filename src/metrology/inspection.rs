@@ -14,7 +14,7 @@ use super::figures::{
 use super::meetings::Meetings;
 use super::regions::connected;
 use super::walls::Walls;
-use crate::beneath::{Bounding, face_before, thinner};
+use crate::beneath::{Bounding, face_before, leads_out, thinner};
 use crate::closer;
 use crate::facing::LEAST_FACING;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -162,13 +162,27 @@ impl Inspection<'_> {
             other.normal.z > LEAST_FACING && !is_below
         };
         let bounding = Bounding { counts: &is_highest, walls: false };
-        let out = thinner(self.part, p, normal, depth, bounding)?.ridge(normal)?.normalize();
-        let cut = self.surface.along_normal(p, &out)?;
-        if -cut.distance >= depth || face_before(self.part, p, &out, cut.distance).is_some() {
-            return None;
+        let thin = thinner(self.part, p, normal, depth, bounding)?;
+        let ridges = thin.ridges(self.part, p, normal, depth, bounding);
+        let cuts = ridges.filter_map(|normals| self.out_of_ridge(p, normals, depth));
+        cuts.max_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+
+    /// The cut of a ridge whose faces have this sum of unit normals, where it is less deep, mm.
+    fn out_of_ridge(&self, p: &Point3, mut normals: Vector3, depth: f64) -> Option<Deviation> {
+        let mut is_corner = false;
+        loop {
+            let out = normals.normalize();
+            let cut = self.surface.along_normal(p, &out).filter(|cut| -cut.distance < depth)?;
+            // Where the way leads out through a third face, it is a corner.
+            if let Some(third) = face_before(self.part, p, &out, cut.distance) {
+                normals = Some(normals + third).filter(|sum| !is_corner && leads_out(sum))?;
+                is_corner = true;
+                continue;
+            }
+            let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();
+            return Some(Deviation { distance: cut.distance.min(0.0), slope: 1.0 + tan, ..cut });
         }
-        let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();
-        Some(Deviation { distance: cut.distance.min(0.0), slope: 1.0 + tan, ..cut })
     }
 
     /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the normals of the design

@@ -78,6 +78,10 @@ impl Served<'_> {
             let serves = |t: f64| self.serves(at(t).xy());
             let count = (way.norm() / sampling).ceil().max(1.0) as usize;
             let mut before = (0.0, serves(0.0));
+            // At a corner rounding may tell otherwise than at the end of the move before.
+            if !before.1 && !open.is_empty() {
+                found.push(mem::take(&mut open));
+            }
             for t in (1..=count).map(|k| k as f64 / count as f64) {
                 let now = (t, serves(t));
                 if before.1 && open.is_empty() {

@@ -304,10 +304,11 @@ impl AlongNormal for SweptVolume<'_> {
         let Some(thin) = thinner(self.part, point, normal, depth, bounding) else {
             return if is_near { Some(found) } else { look(self.inward) };
         };
-        if is_near && thin.is_blunt(normal) {
+        let ridge = thin.ridges(self.part, point, normal, depth, bounding).next();
+        if ridge.is_none() && is_near && thin.is_blunt(normal) {
             return Some(found);
         }
-        match thin.ridge(normal) {
+        match ridge {
             Some(normals) => Some(self.on_ridge(point, normals, [2.0 * thin.radius, depth], found)),
             // What the far side of a thin part has lost is no loss of this one.
             None => {

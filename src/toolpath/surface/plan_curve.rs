@@ -3,6 +3,8 @@
 //! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs on which the
 //! cutter touches surface, and rolls over the part's border no farther than is of use.
 
+use std::mem;
+
 use super::border::Border;
 use crate::moves::chord::Watch;
 use crate::vocabulary::PassSettings;
@@ -18,8 +20,8 @@ const END_PRECISION: f64 = 1e-9;
 /// Shorter stretches are left out, mm.
 const LEAST_STRETCH: f64 = 1e-6;
 
-/// First sampling distance of rolls as a share of that on surface.
-const ROLLING_SAMPLING: f64 = 0.1;
+/// Rolls are sampled so many times as finely as passes on surface.
+const ROLLING_FINER: usize = 10;
 
 /// Places of a roll at the end of a pass that are looked at.
 const ROLL_STEPS: usize = 24;
@@ -90,25 +92,34 @@ impl PlanCurves<'_> {
         let mut start = s0;
         let mut watch = Watch::new(self.monitor);
         for k in 1..=count {
-            watch.step()?;
-            let s = at(k);
-            let now = self.contact(curve, s);
-            // Several changes may lie between two samples; each is located in turn.
-            while before.1 != now {
+            let whole = at(k);
+            let rolls = before.1 == Footing::Rolling && self.contact(curve, whole) == Footing::Rolling;
+            // From corner to corner of the border it may leave the part for less than a sample.
+            let parts = if rolls { ROLLING_FINER } else { 1 };
+            let from = before.0;
+            for part in 1..=parts {
                 watch.step()?;
-                let (end, next) = self.change(curve, before, s);
-                stretches.push((before.1, start, end));
-                (before, start) = ((next, self.contact(curve, next)), next);
+                let s =
+                    if part == parts { whole } else { from + (whole - from) * part as f64 / parts as f64 };
+                let now = self.contact(curve, s);
+                // Several changes may lie between two samples; each is located in turn.
+                while before.1 != now {
+                    watch.step()?;
+                    let (end, next) = self.change(curve, before, s);
+                    stretches.push((before.1, start, end));
+                    (before, start) = ((next, self.contact(curve, next)), next);
+                }
+                before = (s, now);
             }
-            before = (s, now);
         }
         stretches.push((before.1, start, s1));
-        let runs = stretches.split_mut(|(contact, ..)| *contact == Footing::Off);
-        let pieces = runs.map(|run| {
+        let mut pieces = Vec::new();
+        for run in stretches.split_mut(|(contact, ..)| *contact == Footing::Off) {
             self.shorten_ends(curve, run);
-            self.moves(curve, run)
-        });
-        pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
+            pieces.extend(self.moves(curve, run)?);
+        }
+        pieces.retain(|points| points.len() >= 2);
+        Ok(pieces)
     }
 
     /// Cuts the rolls at both ends of a run back to what is of use.
@@ -162,20 +173,26 @@ impl PlanCurves<'_> {
         Some(contact + roll)
     }
 
-    fn moves(&self, curve: Curve<'_>, run: &[(Footing, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
-        let mut points: Vec<Point3> = Vec::new();
+    /// The moves of a run; where it leaves the part after all, those before and behind apart.
+    fn moves(&self, curve: Curve<'_>, run: &[(Footing, f64, f64)]) -> Result<Vec<Vec<Point3>>, Cancelled> {
+        let (mut pieces, mut points) = (Vec::new(), Vec::<Point3>::new());
         for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
             // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
             let mut settings = *self.settings;
             if contact == Footing::Rolling {
-                settings.sampling *= ROLLING_SAMPLING;
+                settings.sampling /= ROLLING_FINER as f64;
                 settings.chord_tolerance *= self.least_upright(curve, [a, b]);
             }
             let stretch = settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
+            let ends = points.last().zip(stretch.first());
+            if ends.is_some_and(|(end, next)| (next - end).norm() > self.settings.chord_tolerance) {
+                pieces.push(mem::take(&mut points));
+            }
             let joined = usize::from(!points.is_empty());
             points.extend(stretch.into_iter().skip(joined));
         }
-        Ok(points)
+        pieces.push(points);
+        Ok(pieces)
     }
 
     /// The least cosine of the slope by which the cutter touches the border along a roll: a chord cuts the border deeper by as much as it
@@ -208,5 +225,59 @@ impl PlanCurves<'_> {
             }
         }
         (same, other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vocabulary::{Faces, SAMPLING_OVER_RADIUS, Step};
+    use geometry::TriangleMesh;
+    use part::Part;
+    use work::monitor::Silent;
+
+    /// A line beside two plates with a slot between them: the ball rolls off the corner of one and comes to the other a sixteenth of a
+    /// millimetre on, less than passes are sampled at. It does not go straight on over the slot, nor does it lose the way behind it.
+    #[test]
+    fn between_two_corners_a_pass_ends_and_another_begins() {
+        let (half, radius, beside) = (0.8f64, 3.0f64, 2.9f64);
+        let plate = |x: [f64; 2]| {
+            [[x[0], -5.0], [x[1], -5.0], [x[1], 0.0], [x[0], 0.0]].map(|[x, y]| Point3::new(x, y, 0.0))
+        };
+        let corners = [plate([-9.0, -half]), plate([half, 9.0])].concat();
+        let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+        let cutter = Cutter::ball(2.0 * radius).unwrap();
+        let settings = PassSettings {
+            step: Step::Stepover(0.5),
+            sampling: SAMPLING_OVER_RADIUS * radius,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+            faces: Faces::ALL,
+            memory: 1 << 30,
+            earlier: None,
+            probe: None,
+        };
+        let curves = PlanCurves {
+            drop: DropCutter::new(&part, &cutter),
+            border: Border::of(&part),
+            cutter: &cutter,
+            overrun: 2.0 * radius,
+            settings: &settings,
+            monitor: &Silent,
+        };
+        let reach = (radius * radius - beside * beside).sqrt();
+        // Wherever the samples fall.
+        for shift in [0.0, 0.1, 0.2, 0.3, 0.4] {
+            let line = |s: f64| Vector2::new(s, beside);
+            let pieces = curves.pieces(&line, [-4.0 + shift, 4.0 + shift]).unwrap();
+            let ends: Vec<[f64; 2]> = pieces.iter().map(|p| [p[0].x, p[p.len() - 1].x]).collect();
+            let wanted = [[-4.0 + shift, reach - half], [half - reach, 4.0 + shift]];
+            assert_eq!(ends.len(), 2, "{ends:?}");
+            for (found, wanted) in ends.iter().flatten().zip(wanted.iter().flatten()) {
+                assert!((found - wanted).abs() < 1e-6, "{ends:?} {wanted}");
+            }
+        }
     }
 }
