@@ -161,6 +161,13 @@ impl GougeFigures {
         let Bounded { max_mm, error_bound_mm, at_least_mm, .. } = depth(self).or(&depth(other));
         Self { max_depth_mm: max_mm, error_bound_mm, at_least_mm, ..self.clone() }
     }
+
+    /// A deeper cut was found, mm.
+    pub(crate) fn raise_to(&mut self, depth: f64) {
+        let possible = self.max_depth_mm + self.error_bound_mm;
+        self.error_bound_mm = (possible - depth).max(NUMERICAL_FLOOR);
+        (self.max_depth_mm, self.at_least_mm) = (depth, depth - NUMERICAL_FLOOR);
+    }
 }
 
 /// A connected place higher than the uncut tolerance.

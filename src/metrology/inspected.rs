@@ -15,8 +15,6 @@ pub(super) struct Inspected {
     pub highest: Option<Highest>,
     pub gouge: GougeFigures,
     pub uncut: UncutFigures,
-    /// Least vertical part of the design's normal.
-    pub least_lean: f64,
 }
 
 /// Inspects one grid; `highest_ridge` is that of the surroundings, mm.
@@ -37,7 +35,6 @@ pub(super) fn inspect(
         gouge: inspection.gouges(&samples, monitor)?,
         uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2, monitor)?,
         deviation,
-        least_lean: samples.iter().map(|s| f64::from(s.lean)).fold(1.0, f64::min),
         samples,
     })
 }

@@ -13,12 +13,13 @@ use super::figures::{
 };
 use super::meetings::Meetings;
 use super::regions::connected;
+use super::unseen::{Dip, dips};
 use super::walls::Walls;
 use crate::beneath::{Bounding, face_before, leads_out, thinner};
 use crate::closer;
 use crate::facing::LEAST_FACING;
 use geometry::{Point2, Point3, Vector2, Vector3};
-use motion::Cutters;
+use motion::{Cutters, Toolpath};
 use part::{Part, SurfaceGrid, SurfacePoint};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
@@ -141,7 +142,12 @@ impl Inspection<'_> {
 
     /// The deviation at a place of the design, and whether a wall beside it accounts for it.
     fn along_normal(&self, p: &Point3, normal: &Vector3) -> Option<(Deviation, bool)> {
-        let found = self.surface.along_normal(p, normal)?;
+        self.along_normal_with(p, normal, &[])
+    }
+
+    /// The same with further moves that may be lowest between centres.
+    fn along_normal_with(&self, p: &Point3, normal: &Vector3, further: &[u32]) -> Option<(Deviation, bool)> {
+        let found = self.surface.along_normal_with(p, normal, further)?;
         let distance = self.walls.map_or(found.distance, |walls| walls.beside(p, found.distance));
         if distance != found.distance {
             return Some((Deviation { distance, slope: 0.0, ..found }, true));
@@ -399,9 +405,82 @@ impl Inspection<'_> {
 
     /// Depth at a place of the plan, its design point, and the move that cut it.
     fn depth_at(&self, q: Point2) -> Option<(f64, Point3, u32)> {
-        let design = self.design_at(q)?;
-        let (d, _) = self.along_normal(&design.point, &design.normal)?;
+        self.depth_with(q, &[])
+    }
+
+    /// The same with further moves that may be lowest between centres.
+    fn depth_with(&self, q: Point2, further: &[u32]) -> Option<(f64, Point3, u32)> {
+        let design = self.design_at(q).filter(|design| design.normal.z >= self.steepest)?;
+        let (d, _) = self.along_normal_with(&design.point, &design.normal, further)?;
         Some((-d.distance, design.point, d.by))
+    }
+
+    /// Raises the deepest gouge to that of moves which stand deeper in the design than the cells show: they may be lowest at no centre, or
+    /// beside one that another move cut. Leaves the places where one may stand deeper yet.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn raise_by_moves(
+        &self,
+        path: &Toolpath,
+        samples: &[Sample],
+        gouge: &mut GougeFigures,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Dip>, Cancelled> {
+        /// What is found tells the next round what is known.
+        const ROUNDS: usize = 3;
+        let mut moves: Vec<u32> = (0..path.len() as u32).collect();
+        let mut left = Vec::new();
+        for _ in 0..ROUNDS {
+            let known = gouge.max_depth_mm + NUMERICAL_FLOOR;
+            left = dips(self.part, self.cutters, path, &moves, self.grid.cell, known, monitor)?;
+            moves = left.iter().map(|dip| dip.by).collect();
+            let mut deepest: Option<(f64, Point3, u32)> = None;
+            for dip in &mut left {
+                monitor::check(monitor)?;
+                // A ridge, or a wall, may be cut less deep than the cutter stands in it.
+                let found = self.depth_with(dip.at, &[dip.by]);
+                let depth = found.map_or(f64::NEG_INFINITY, |(depth, ..)| depth);
+                (dip.depth, dip.possible) = (depth, depth + (dip.possible - dip.depth).max(0.0));
+                deepest = deepest.into_iter().chain(found).max_by(|a, b| a.0.total_cmp(&b.0));
+            }
+            left.retain(|dip| dip.possible > known);
+            let Some((depth, at, by)) = deepest.filter(|(depth, ..)| *depth > known) else { break };
+            gouge.raise_to(depth);
+            if depth > self.limits.gouge {
+                self.list_gouge(samples, gouge, (depth, at, by));
+            }
+        }
+        Ok(left)
+    }
+
+    /// Lists a gouge with its depth, place and move: as the deepest of the cells' own region there, or as one that no centre saw.
+    fn list_gouge(&self, samples: &[Sample], gouge: &mut GougeFigures, found: (f64, Point3, u32)) {
+        let (depth_mm, at, move_index) = found;
+        let cell_of = |at: &Point3| self.grid.cell_at(at.x, at.y).map(|(i, j)| self.grid.index(i, j) as u32);
+        let own = cell_of(&at);
+        let all = connected(&self.grid, &|k| f64::from(samples[k].deviation) < -self.limits.gouge);
+        let of_cells = all.iter().find(|region| own.is_some_and(|cell| region.contains(&cell)));
+        let holds = |listed: &&mut GougeRegion| {
+            let cell = cell_of(&listed.at_mm.into());
+            of_cells.is_some_and(|region| cell.is_some_and(|cell| region.contains(&cell)))
+        };
+        match gouge.regions.iter_mut().find(holds) {
+            Some(listed) => {
+                *listed = GougeRegion { depth_mm, at_mm: at.into(), move_index, ..listed.clone() };
+            }
+            None => {
+                gouge.region_count += 1;
+                gouge.regions.push(GougeRegion {
+                    depth_mm,
+                    at_mm: at.into(),
+                    move_index,
+                    ..GougeRegion::default()
+                });
+            }
+        }
+        gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
+        gouge.regions.truncate(LISTED_REGIONS);
     }
 
     /// The deepest place within a cell of cell `k`, by compass search on the exact surfaces: depth,
@@ -524,4 +603,33 @@ fn measured(samples: &[Sample]) -> impl Iterator<Item = (usize, f64)> {
 /// The cell of a region with the least value, the first of equals.
 fn least_by(region: &[u32], value: impl Fn(usize) -> f64) -> Option<&u32> {
     region.iter().min_by(|a, b| value(**a as usize).total_cmp(&value(**b as usize)))
+}
+
+#[cfg(test)]
+mod tests {
+    use cutter::Cutter;
+    use geometry::Point3;
+
+    use crate::flat_scene::{gouge_of, plane};
+
+    /// Passes half way between the centres of cells, each of which dips at one place: the centres around it are cut by other passes, or
+    /// higher up. On cells of every size the deepest dip is told.
+    #[test]
+    fn a_dip_between_centres_is_as_deep_on_cells_of_every_size() {
+        let (cutter, step) = (Cutter::ball(2.0).unwrap(), 0.2);
+        let dips = [0.0018, 0.0009, 0.0021, 0.0012];
+        let passes: Vec<Vec<Point3>> = (0..20)
+            .map(|k| {
+                let (y, dip) = (step * f64::from(k), dips[k as usize % 4]);
+                let at = 0.37 * f64::from(k % 7) + 0.5;
+                let tips = [[-1.0, 0.0], [at - 0.04, 0.0], [at, -dip], [at + 0.04, 0.0], [5.0, 0.0]];
+                tips.map(|[x, z]| Point3::new(x, y, z)).to_vec()
+            })
+            .collect();
+        for cell in [0.05, 0.13, 0.2, 0.31, 0.4] {
+            let found = gouge_of(&plane([4.0, 4.0]), &cutter, &passes, cell);
+            let off = (found.max_depth_mm - 0.0021).abs();
+            assert!(off <= found.error_bound_mm && off < 1e-4, "{cell}: {found:?}");
+        }
+    }
 }

@@ -17,7 +17,6 @@ use super::refine::{Asked, Refinement, open_bounds};
 use super::ridge_map::borders;
 use super::ridges::{Ridges, scallop_figures};
 use super::tracks::Tracks;
-use super::unseen::{dips, most_unseen};
 use super::walls::{WallTask, Walls};
 use super::{Facing, REACH_OVER_UNCUT};
 use cutter::Cutter;
@@ -26,9 +25,6 @@ use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
-
-/// The least vertical part of the design's normal that dips between centres are thought of with.
-const LEAST_LEAN: f64 = 0.2;
 
 /// Measures `cut`, the stock after `path`, against `part`, looking closer until the error bounds of the
 /// greatest scallop, gouge and uncut height are the asked ones. Where they do not come down to that, a note
@@ -96,7 +92,6 @@ pub fn measure_with_walls(
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
-    let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
     let pairs = pair_figures(part, cutters, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
     let mut above = std::mem::take(&mut found.ridges.above);
@@ -115,11 +110,7 @@ pub fn measure_with_walls(
         deviation_map: found.samples.iter().map(|s| s.deviation).collect(),
         refined: CloserLook::default(),
     };
-    let mut hiding = Vec::new();
-    if most_unseen(cutters, cut.grid.cell, lean.max(LEAST_LEAN)) > bound {
-        let known = measured.gouge.max_depth_mm + bound;
-        hiding = dips(part, cutters, path, cut.grid.cell, known, monitor)?;
-    }
+    let hiding = inspection.raise_by_moves(path, &found.samples, &mut measured.gouge, monitor)?;
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
     if asked.borders {

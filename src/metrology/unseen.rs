@@ -4,7 +4,7 @@
 //! where that is too much, the places of moves that stand deeper in the design than what the cells saw. mm.
 
 use cutter::Cutter;
-use geometry::{Point2, Point3};
+use geometry::{Point2, Point3, Vector3};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
@@ -12,14 +12,21 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Most places looked at along one move: longer moves at a wider pitch. 3 µs each.
 const MOST_ON_A_MOVE: f64 = 1e5;
 
+/// Moves looked at one after the other.
+const MOVES_AT_A_TIME: usize = 64;
+
 /// Parts of a step that may hide a dip. More are looked at for nothing, fewer take more rounds.
 const CLOSER_STEPS: usize = 8;
 
 /// How often steps are divided at most. Four times bring a step of 0.1 mm to 25 nm.
 const MOST_LOOKS: usize = 4;
 
-/// From the design's normal below the tip to that at the contact in so many steps.
-const CONTACT_STEPS: usize = 2;
+/// From the design's normal below the tip to that at the contact in so many steps at most: each leaves a share of the error that is the
+/// curvature of the design over that of the cutter.
+const CONTACT_STEPS: usize = 12;
+
+/// Nearer normals are the same: what the cutter stands deeper by is the radius times half the square.
+const SAME_NORMAL: f64 = 1e-4;
 
 /// A contact counts when it lies beside its foot along the normal to this share: not beyond the border.
 const BESIDE: f64 = 0.1;
@@ -48,65 +55,93 @@ pub(super) struct Dip {
     pub possible: f64,
     /// Where.
     pub at: Point2,
+    /// The move.
+    pub by: u32,
 }
 
-/// The places on every move, `pitch` mm apart, where the cutter may stand deeper in the design than
-/// `known` mm, the deepest of each move.
+/// The places on moves, `pitch` mm apart, where the cutter may stand deeper in the design than `known` mm, the deepest of each. The moves are
+/// given by their indices, rising.
 pub(super) fn dips(
     part: &Part,
     cutters: &Cutters,
     path: &Toolpath,
+    moves: &[u32],
     pitch: f64,
     known: f64,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Dip>, Cancelled> {
-    let bounds = part.bounds();
-    let deepest = work::parallel::try_map(path.len(), |k| {
+    let top = part.bounds().max.z;
+    let runs = work::parallel::try_map(moves.len().div_ceil(MOVES_AT_A_TIME), |run| {
         monitor::check(monitor)?;
-        let (from, to) = (path.start_of(k), path.moves[k].to.tip);
-        if from.z.min(to.z) > bounds.max.z {
-            return Ok(None);
+        let first = run * MOVES_AT_A_TIME;
+        let mut found = Vec::new();
+        // Where one move ends the next one begins.
+        let mut last: Option<(u32, Option<Dip>)> = None;
+        for &by in &moves[first..(first + MOVES_AT_A_TIME).min(moves.len())] {
+            let (from, to) = (path.start_of(by as usize), path.moves[by as usize].to.tip);
+            if from.z.min(to.z) > top {
+                continue;
+            }
+            let cutter = cutters.of_move(by);
+            let at = |share: f64| {
+                let dip = dip_at(part, cutter, &(from + (to - from) * share));
+                dip.map(|dip| Dip { by, ..dip })
+            };
+            let length = (to - from).norm();
+            let steps = (length / pitch).ceil().clamp(2.0, MOST_ON_A_MOVE) as usize;
+            let goes_on = |before: &u32| before + 1 == by && cutters.of_move(*before) == cutter;
+            let start = last.filter(|(before, _)| goes_on(before)).map_or_else(|| at(0.0), |(_, dip)| dip);
+            let ends = [start, at(1.0)];
+            let stretch = Stretch { at: &at, length, shares: [0.0, 1.0], ends };
+            let all = stretch.dips(steps, known, MOST_LOOKS).into_iter();
+            let deeper =
+                |a: &Dip, b: &Dip| a.possible.total_cmp(&b.possible).then(b.depth.total_cmp(&a.depth));
+            found.extend(all.max_by(deeper));
+            last = Some((by, ends[1]));
         }
-        let length = (to - from).norm();
-        let cutter = cutters.of_move(k as u32);
-        let at = |share: f64| dip_at(part, cutter, &(from + (to - from) * share));
-        let steps = (length / pitch).ceil().clamp(2.0, MOST_ON_A_MOVE);
-        let deepest = dips_between(&at, length, [0.0, 1.0], steps as usize, known, MOST_LOOKS)
-            .into_iter()
-            .max_by(|a, b| a.possible.total_cmp(&b.possible).then(b.depth.total_cmp(&a.depth)));
-        Ok(deepest)
+        Ok(found)
     })?;
-    Ok(deepest.into_iter().flatten().collect())
+    Ok(runs.into_iter().flatten().collect())
 }
 
-/// The places of a stretch of a move, from one share of its `length` to another, that may be deeper than `known` mm. Where the
-/// cutter may stand deeper between two of them than at either, the places between are looked at, `looks` times over.
-fn dips_between(
-    at: &dyn Fn(f64) -> Option<Dip>,
+/// A stretch of a move.
+struct Stretch<'a> {
+    /// The dip at a share of the move.
+    at: &'a dyn Fn(f64) -> Option<Dip>,
+    /// Of the move, mm.
     length: f64,
-    [from, to]: [f64; 2],
-    steps: usize,
-    known: f64,
-    looks: usize,
-) -> Vec<Dip> {
-    let share = |k: usize| from + (to - from) * (k as f64 / steps as f64);
-    let along: Vec<Option<Dip>> = (0..=steps).map(|k| at(share(k))).collect();
-    let step = (to - from) * length / steps as f64;
-    let mut found = Vec::new();
-    for k in 0..=steps {
-        let Some(here) = along[k] else { continue };
-        let possible = here.depth.max(before(&along, k, step));
-        if possible <= known {
-            continue;
+    /// Of the move, where the stretch begins and ends.
+    shares: [f64; 2],
+    /// The dips there.
+    ends: [Option<Dip>; 2],
+}
+
+impl Stretch<'_> {
+    /// The places that may be deeper than `known` mm, of those `steps` apart. Where the cutter may stand deeper between two of them than
+    /// at either, the places between are looked at, `looks` times over.
+    fn dips(&self, steps: usize, known: f64, looks: usize) -> Vec<Dip> {
+        let Self { at, length, shares: [from, to], ends } = *self;
+        let share = |k: usize| from + (to - from) * (k as f64 / steps as f64);
+        let between = (1..steps).map(|k| at(share(k)));
+        let along: Vec<Option<Dip>> = [ends[0]].into_iter().chain(between).chain([ends[1]]).collect();
+        let step = (to - from) * length / steps as f64;
+        let mut found = Vec::new();
+        for k in 0..=steps {
+            let Some(here) = along[k] else { continue };
+            let possible = here.depth.max(before(&along, k, step));
+            if possible <= known {
+                continue;
+            }
+            let last = along[k.saturating_sub(1)].map_or(here.depth, |last| last.depth);
+            if k == 0 || looks == 0 || here.depth.max(last) > known {
+                found.push(Dip { possible, ..here });
+            } else {
+                let (shares, ends) = ([share(k - 1), share(k)], [along[k - 1], along[k]]);
+                found.extend(Stretch { shares, ends, ..*self }.dips(CLOSER_STEPS, known, looks - 1));
+            }
         }
-        let last = along[k.saturating_sub(1)].map_or(here.depth, |last| last.depth);
-        if k == 0 || looks == 0 || here.depth.max(last) > known {
-            found.push(Dip { possible, ..here });
-        } else {
-            found.extend(dips_between(at, length, [share(k - 1), share(k)], CLOSER_STEPS, known, looks - 1));
-        }
+        found
     }
-    found
 }
 
 /// How deep the cutter stands at most between a place and the one before, mm.
@@ -132,19 +167,32 @@ fn before(along: &[Option<Dip>], k: usize, step: f64) -> f64 {
 
 /// How deep the cutter with its tip at `tip` stands in the design where it touches; `None` off the part.
 fn dip_at(part: &Part, cutter: &Cutter, tip: &Point3) -> Option<Dip> {
-    let mut normal = part.highest_at(tip.x, tip.y)?.normal;
-    let mut dip = None;
+    let dip = |depth: f64, foot: &Point3| Dip { depth, possible: depth, at: foot.xy(), by: 0 };
+    let is_beside = |aside: Vector3, height: f64| aside.norm() <= BESIDE * height.abs() + 1e-9;
+    let mut normal = if cutter.is_ball() {
+        let centre = tip + Vector3::z() * cutter.radius();
+        let (foot, distance) = part.closest_point(&centre);
+        let depth = cutter.radius() - distance;
+        if is_beside(centre - foot.point - foot.normal * distance, depth) {
+            return Some(dip(depth, &foot.point));
+        }
+        foot.normal
+    } else {
+        part.highest_at(tip.x, tip.y)?.normal
+    };
+    let mut found = None;
     for _ in 0..CONTACT_STEPS {
         let contact = tip - cutter.contact_to_tip(&normal);
         let (foot, height) = part.closest_point(&contact);
-        let aside = (contact - foot.point - foot.normal * height).norm();
-        if aside <= BESIDE * height.abs() + 1e-9 {
-            dip =
-                Some(Dip { depth: -height, possible: -height, at: Point2::new(foot.point.x, foot.point.y) });
+        if is_beside(contact - foot.point - foot.normal * height, height) {
+            found = Some(dip(-height, &foot.point));
+        }
+        if (foot.normal - normal).norm() < SAME_NORMAL {
+            break;
         }
         normal = foot.normal;
     }
-    dip
+    found
 }
 
 #[cfg(test)]
@@ -164,10 +212,11 @@ mod tests {
         let touching = foot.point + cutter.contact_to_tip(&foot.normal);
         // From 2 mm above the design to 0.25 mm in it.
         let path = path_through([touching + foot.normal * 2.0, touching - foot.normal * 0.25]);
-        let found = dips(&part, &cutter.into(), &path, 0.1, 0.1, &Silent).unwrap();
+        let all: Vec<u32> = (0..path.len() as u32).collect();
+        let found = dips(&part, &cutter.into(), &path, &all, 0.1, 0.1, &Silent).unwrap();
         assert!(found.len() == 1 && (found[0].depth - 0.25).abs() < 1e-9, "{found:?}");
         assert!((found[0].at - Point2::new(9.0, 11.0)).norm() < 1e-6);
-        assert!(dips(&part, &cutter.into(), &path, 0.1, 0.4, &Silent).unwrap().is_empty());
+        assert!(dips(&part, &cutter.into(), &path, &all, 0.1, 0.4, &Silent).unwrap().is_empty());
     }
 
     /// Depths along a move that plunges to just the surface, and of one that passes over a crest between two places.
@@ -175,7 +224,7 @@ mod tests {
     fn a_straight_plunge_is_no_deeper_than_its_end_and_a_kink_no_higher_than_told() {
         let dips = |depths: &dyn Fn(f64) -> f64| -> Vec<Option<Dip>> {
             let of = |k: i32| depths(0.1 * f64::from(k));
-            (0..9).map(|k| Some(Dip { depth: of(k), possible: of(k), at: Point2::origin() })).collect()
+            (0..9).map(|k| Some(Dip { depth: of(k), possible: of(k), at: Point2::origin(), by: 0 })).collect()
         };
         let plunge = dips(&|s| s - 0.8);
         assert!((1..9).all(|k| (before(&plunge, k, 0.1) - plunge[k].unwrap().depth).abs() < 1e-12));
