@@ -70,6 +70,20 @@ fn comes_out(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<S
     (way < 0.0 && distance > NUMERICAL_FLOOR).then_some(face)
 }
 
+/// The sum of the unit normals of a corner: of a ridge with `normals` as that of its faces, one of which is `face`, and of a third face that
+/// bends sharply from both and is nearer than they to the middle of what was cut along their middle, `depth` mm from the place.
+pub(crate) fn corner_at(
+    part: &Part,
+    place: &Point3,
+    normals: &Vector3,
+    face: &Vector3,
+    depth: f64,
+) -> Option<Vector3> {
+    let (third, distance) = part.closest_point(&(place - normals.normalize() * (0.5 * depth)));
+    let is_sharp = [*face, normals - face].iter().all(|own| own.dot(&third.normal) <= SHARP);
+    Some(normals + third.normal).filter(|sum| distance < 0.0 && is_sharp && leads_out(sum))
+}
+
 /// What part of the surface bounds the solid, besides the place itself.
 #[derive(Clone, Copy)]
 pub(crate) struct Bounding<'a> {

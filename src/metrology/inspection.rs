@@ -15,7 +15,7 @@ use super::meetings::Meetings;
 use super::regions::connected;
 use super::unseen::{Dip, dips};
 use super::walls::Walls;
-use crate::beneath::{Bounding, face_before, leads_out, thinner};
+use crate::beneath::{Bounding, corner_at, face_before, leads_out, thinner};
 use crate::closer;
 use crate::facing::LEAST_FACING;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -170,8 +170,12 @@ impl Inspection<'_> {
         let bounding = Bounding { counts: &is_highest, walls: false };
         let thin = thinner(self.part, p, normal, depth, bounding)?;
         let ridges = thin.ridges(self.part, p, normal, depth, bounding);
-        let cuts = ridges.filter_map(|normals| self.out_of_ridge(p, normals, depth));
-        cuts.max_by(|a, b| a.distance.total_cmp(&b.distance))
+        let cuts = ridges.flat_map(|normals| {
+            let cut = self.out_of_ridge(p, normals, depth);
+            let corner = cut.and_then(|cut| corner_at(self.part, p, &normals, normal, -cut.distance));
+            [cut, corner.and_then(|normals| self.out_of_ridge(p, normals, depth))]
+        });
+        cuts.flatten().max_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
     /// The cut of a ridge whose faces have this sum of unit normals, where it is less deep, mm.

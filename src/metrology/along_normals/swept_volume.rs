@@ -4,7 +4,7 @@
 //! are looked for close to the design first, and count only as far as a ball fits inside the part.
 
 use super::{AlongNormal, NormalHit, Way};
-use crate::beneath::{Bounding, ball_beneath, face_before, leads_out, thinner};
+use crate::beneath::{Bounding, ball_beneath, corner_at, face_before, leads_out, thinner};
 use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
@@ -309,7 +309,14 @@ impl AlongNormal for SweptVolume<'_> {
             return Some(found);
         }
         match ridge {
-            Some(normals) => Some(self.on_ridge(point, normals, [2.0 * thin.radius, depth], found)),
+            Some(normals) => {
+                let looked = [2.0 * thin.radius, depth];
+                let cut = self.on_ridge(point, normals, looked, found);
+                let corner = corner_at(self.part, point, &normals, normal, -cut.deviation);
+                let of_corner =
+                    corner.map(|normals| self.on_ridge(point, normals, looked, found));
+                of_corner.into_iter().chain([cut]).max_by(|a, b| a.deviation.total_cmp(&b.deviation))
+            }
             // What the far side of a thin part has lost is no loss of this one.
             None => {
                 let hit = look(thin.radius)?;

@@ -282,6 +282,47 @@ fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower
     }
 }
 
+/// A ball that dips into the corner of a block: lines along the walls, and along the middle of both walls, graze what it took of the top.
+#[test]
+fn a_corner_is_cut_as_deep_as_it_is_lower() {
+    let (deep, low) = (3e-4, -4.0);
+    let side = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+    let ring = |z: f64| side.map(|[x, y]| Point3::new(x, y, z));
+    let triangles = vec![
+        [0, 1, 2],
+        [0, 2, 3],
+        [4, 5, 1],
+        [4, 1, 0],
+        [5, 6, 2],
+        [5, 2, 1],
+        [6, 7, 3],
+        [6, 3, 2],
+        [7, 4, 0],
+        [7, 0, 3],
+    ];
+    let block = TriangleMesh::new([ring(0.0), ring(low)].concat(), triangles).unwrap().0;
+    let (part, ball) = (Part::from_mesh(block), Cutter::ball(2.0 * RADIUS).unwrap());
+    let solid = Solid::of_cutter(&ball, None);
+    let down = |z: f64| Move {
+        to: ClPoint::upright(Point3::new(0.0, 0.0, z)),
+        kind: MoveKind::Cut,
+        feed_rate: 1000.0,
+        pass: 0,
+    };
+    let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 2.0)), vec![down(-deep)]);
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let cut = swept(&part, &by_rays, 1.0);
+    // The line down the middle of all three faces is the longest that counts.
+    for below in [1e-7, 1e-6, 1e-5, 1e-4] {
+        for normal in [-Vector3::x(), -Vector3::y()] {
+            let hit = cut.hit(&Point3::new(0.0, 0.0, -below), &normal, None).unwrap();
+            let depth = -hit.deviation;
+            assert!(depth > 0.0 && depth <= 3f64.sqrt() * deep, "{below}: {hit:?}");
+        }
+    }
+}
+
 /// Along the foot of a wall, a mm before it, a flat end cuts the floor: lines along the wall's normal graze what was cut, so that its slope
 /// says nothing.
 #[test]
