@@ -710,12 +710,14 @@ impl Corrected<'_> {
         Some(widths.narrowed(&high))
     }
 
-    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to leave it as well.
+    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to leave it as well, with what
+    /// arcs may lead the tool astray.
     fn room(&self) -> f64 {
-        let tolerance = &self.session.scene.tolerance;
+        let scene = &self.session.scene;
+        let (tolerance, strays) = (&scene.tolerance, scene.arcs.unwrap_or(0.0));
         let (chord, is_smoothed) = (tolerance.chord, self.request.joining.smoothing);
         let unused = unused_tolerance(chord, is_smoothed);
-        unused.min(tolerance.gouge - (chord - unused))
+        unused.min(tolerance.gouge - (chord - unused) - strays)
     }
 
     /// Widths with deeper moves beside the places where that is enough; `None` without such places.

@@ -252,12 +252,11 @@ impl Session {
         }
     }
 
-    /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool astray.
+    /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool astray, or arcs an upright one.
     pub(crate) fn aimed_at(&self, request: &ToolpathRequest) -> Step {
+        let strays = if request.tilts() { may_stray(&self.scene) } else { self.scene.arcs.unwrap_or(0.0) };
         match request.step {
-            Step::Scallop(height) if request.tilts() => {
-                Step::Scallop((height - may_stray(&self.scene)).max(LEAST_AIM * height))
-            }
+            Step::Scallop(height) => Step::Scallop((height - strays).max(LEAST_AIM * height)),
             step => step,
         }
     }

@@ -394,6 +394,28 @@ mod tests {
         assert!(said.contains("a lesser `arcs`") && !said.contains("finer cell"), "{said}");
     }
 
+    /// Plans keep clear of what arcs may be off their moves, so that they hold the target for certain.
+    #[test]
+    fn arcs_leave_a_corrected_plan_decided() {
+        for (part, toolpath) in [
+            ("surface = \"cylinder\"\nradius = 10.4\nazimuth = 0", "strategy = \"zigzag\"\nangle = 90"),
+            ("surface = \"sphere\"\nradius = 20.6\nconcave = true", "strategy = \"spiral\""),
+        ] {
+            let text = format!(
+                "[part]\n{part}\nx = [0.6, 5]\ny = [-2.8, 3]\n[cutter]\nshape = \"ball\"\ndiameter = 2.4\n[tolerance]\n\
+                 scallop = 0.0055\nchord = 0.002\n[machine]\narcs = 0.0005\n[simulation]\nremoval = false\n[[toolpath]]\n{toolpath}\n"
+            );
+            let session = Session::new(Scene::parse("dome.toml", text).unwrap()).unwrap();
+            let result =
+                session.toolpath(&session.scene.toolpaths[0], &work::monitor::Silent).unwrap().result;
+            let claims: Vec<String> = result.claims.iter().map(report::Claim::sentence).collect();
+            let undecided = |claim: &report::Claim| claim.verdict() != report::Verdict::Pass;
+            assert!(!result.claims.iter().any(undecided), "{part}: {claims:?}");
+            let highest = result.scallop.max_mm.unwrap();
+            assert!(highest > 0.0040 && highest < 0.0050, "{part}: {highest}");
+        }
+    }
+
     /// What the planner lets the cutter into the triangles, and these into the true surface, is no gouge.
     #[test]
     fn tools_are_kept_off_triangles_that_lie_within_the_gouge_tolerance() {

@@ -137,6 +137,30 @@ fn the_machine_rests_at_dwells_and_stops() {
     assert_eq!(stops("G61\nG1 X1 F9\nX2\nM30\n", Control::from_word("grbl").unwrap()), []);
 }
 
+/// The places of the tip from the start on, as the first rapids of a program lead it.
+fn led(text: &str) -> Vec<[f64; 3]> {
+    let read = read_with(text, GENERAL_CONTROL, &Setup::from_above(200.0)).from_above();
+    let tip = |place: &Place| [place[0], place[1], place[2] + 200.0];
+    std::iter::once(&read.start).chain(read.steps.iter().map(|step| &step.to)).map(tip).collect()
+}
+
+#[test]
+fn until_a_place_is_known_the_tool_is_above_all_of_the_program() {
+    // Higher than the assumed start, and lower beside it.
+    assert_eq!(
+        led("G0 Z303\nX-4 Y-2\nG1 Z300 F9\nM30\n"),
+        [[0.0, 0.0, 303.0], [-4.0, -2.0, 303.0], [-4.0, -2.0, 303.0], [-4.0, -2.0, 300.0]]
+    );
+    assert_eq!(
+        led("G0 Z5\nX9\nY3\nG1 Z0 F9\nG0 Z8\nM30\n")[..4],
+        [[0.0, 0.0, 200.0], [9.0, 3.0, 200.0], [9.0, 3.0, 200.0], [9.0, 3.0, 5.0]]
+    );
+    assert_eq!(led("G0 X9 Y3 Z5\nG1 Z0 F9\nM30\n")[..2], [[9.0, 3.0, 200.0], [9.0, 3.0, 5.0]]);
+    // The tool goes down where it is said to, and feeds from where it is.
+    assert_eq!(led("G0 X9 Y3\nZ-5\nG1 X0 F9\nM30\n")[1..3], [[9.0, 3.0, 200.0], [9.0, 3.0, -5.0]]);
+    assert_eq!(led("G0 Z5\nG1 X9 F9\nG0 Y3\nM30\n")[1], [0.0, 0.0, 5.0]);
+}
+
 #[test]
 fn the_way_from_where_nobody_knows_is_told() {
     let approaches = |text: &str| stops_and_approaches(text, GENERAL_CONTROL).1;

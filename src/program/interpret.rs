@@ -998,6 +998,11 @@ impl<'a> Interpreter<'a> {
         if self.places && !self.fed {
             self.out.approach = self.out.steps.len();
         }
+        if kind != StepKind::Set {
+            let last = self.out.steps.len() - 1;
+            let placed = self.out.first.iter_mut().zip(self.placed).filter(|(_, placed)| *placed);
+            placed.for_each(|(first, _)| *first = first.or(Some(last)));
+        }
         Ok(())
     }
 

@@ -108,6 +108,8 @@ pub struct Program {
     pub dwells: Vec<(usize, f64)>,
     /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to its first place.
     pub approach: usize,
+    /// The steps that lead X, Y and Z to their first places.
+    pub first: [Option<usize>; 3],
     /// The arcs among them.
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.
@@ -134,6 +136,39 @@ impl Program {
     /// Where step `k` begins.
     pub fn start_of(&self, k: usize) -> &Place {
         k.checked_sub(1).map_or(&self.start, |before| &self.steps[before].to)
+    }
+
+    /// Nobody knows where the tool stands before X, Y and Z are led to their first places: until then it is as high as the program ever
+    /// feeds, and where Z is led first, it comes down at the first place of X and Y. So no way from an assumed place cuts anything.
+    #[must_use]
+    pub fn from_above(mut self) -> Self {
+        let Self { start, steps, approach, first, .. } = &mut self;
+        let [Some(x), Some(y), Some(z)] = *first else { return self };
+        let last = x.max(y).max(z);
+        if last >= *approach {
+            return self;
+        }
+        let is_fed = |step: &Step| matches!(step.kind, StepKind::Feed | StepKind::Arc(_));
+        let (led, behind) = steps.split_at(last + 1);
+        let seen = led.iter().chain(behind.iter().filter(|step| is_fed(step)));
+        let height = seen.map(|step| step.to[2]).fold(start[2], f64::max);
+        let over = [steps[x].to[0], steps[y].to[1], height];
+        start[2] = height;
+        steps[..last].iter_mut().for_each(|step| step.to[2] = height);
+        if z >= x.max(y) {
+            // X and Y are led above everything, or with Z.
+            if z == x.max(y) {
+                start[..2].copy_from_slice(&over[..2]);
+            }
+            return self;
+        }
+        steps[z..last].iter_mut().for_each(|step| step.to[..3].copy_from_slice(&over));
+        self
+    }
+
+    /// The highest place of the tip over the part's zero, mm.
+    pub fn highest(&self) -> f64 {
+        self.steps.iter().map(|step| step.to[2] - self.zero[2]).fold(0.0, f64::max)
     }
 
     /// What holds during a step.

@@ -20,8 +20,8 @@ use toolpath::{ForeignProgram, ReadProgram, ToolsMeant};
 /// Largest program that is read, bytes: some twenty million lines.
 const MAX_BYTES: u64 = 1 << 29;
 
-/// How far above the program's zero the tool starts, mm, and that of the machine is taken to be where no machine is known. G28 and G53
-/// go there.
+/// How far above the program's zero the tool starts, mm, and that of the machine is taken to be where no machine is known: above the
+/// highest place of a program that with the longest tool goes higher. G28 and G53 go there.
 pub const MACHINE_ZERO_ABOVE: f64 = 200.0;
 
 /// Largest table of tools that is read, bytes.
@@ -63,10 +63,17 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
         let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
         let any_radius = table.tools.is_empty().then(|| scene.cutter.radius());
+        let longest = lengths.values().copied().fold(0.0, f64::max);
         let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
-        read_gcode(&name, &bytes, control, &setup)
+        match read_gcode(&name, &bytes, control, &setup) {
+            Ok(read) if !setup.offsets_known && read.highest() + longest > MACHINE_ZERO_ABOVE => {
+                let above = Setup::from_above(MACHINE_ZERO_ABOVE + read.highest() + longest);
+                read_gcode(&name, &bytes, control, &Setup { work: above.work, ..setup })
+            }
+            read => read,
+        }
     };
-    let read = read.map_err(refused)?;
+    let read = read.map_err(refused)?.from_above();
     let kinematics = scene.five_axis.as_ref().map(|machine| &machine.kinematics);
     // Locations by APT are of the tip, whatever its length.
     let length = |tool: u32| lengths.get(&tool).copied().filter(|_| !is_apt);

@@ -79,25 +79,28 @@ fn through(places: &[Point3], least: f64, tolerance: f64) -> Option<Arc> {
         let (u, v) = (from - centre, to - centre);
         sense * u.perp(&v).atan2(u.dot(&v))
     };
+    // Each move's end and middle, off the circle.
+    let mut aside = vec![[0.0; 2]];
     let mut turns = vec![0.0];
     for pair in places.windows(2) {
         let (from, to) = (pair[0].xy(), pair[1].xy());
         let turn = turned(&from, &to);
-        let near = |p: &Point2| ((p - centre).norm() - radius).abs() <= tolerance;
-        if turn <= 0.0 || !near(&to) || !near(&nalgebra::center(&from, &to)) {
+        let off = [to, nalgebra::center(&from, &to)].map(|p| ((p - centre).norm() - radius).abs());
+        if turn <= 0.0 || off.iter().any(|off| *off > tolerance) {
             return None;
         }
+        aside.push(off);
         turns.push(turns[turns.len() - 1] + turn);
     }
     let (whole, rise) = (turns[last], places[last].z - places[0].z);
-    let level = |(p, turn): (&Point3, &f64)| (p.z - places[0].z - rise * turn / whole).abs() <= tolerance;
+    let above = |k: usize| (places[k].z - places[0].z - rise * turns[k] / whole).abs();
+    let near = |k: usize| {
+        let [end, middle] = aside[k];
+        end.hypot(above(k)) <= tolerance && middle.hypot(above(k - 1).max(above(k))) <= tolerance
+    };
     let gone: f64 = places.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
     let as_long = ((whole * radius).hypot(rise) - gone).abs() <= AS_LONG * gone;
-    (whole <= MOST_TURN && as_long && places.iter().zip(&turns).all(level)).then_some(Arc {
-        moves: last,
-        middle,
-        clockwise,
-    })
+    (whole <= MOST_TURN && as_long && (1..=last).all(near)).then_some(Arc { moves: last, middle, clockwise })
 }
 
 /// As programs write it.
@@ -152,6 +155,19 @@ mod tests {
             let back: Vec<Point3> = places.into_iter().rev().collect();
             assert!(longest(&back, sagitta + 4e-4).unwrap().clockwise);
         }
+    }
+
+    /// What an arc is off its moves in the plan and in height it is off together.
+    #[test]
+    fn arcs_stay_near_their_moves_in_space() {
+        let moves = |off: [f64; 2]| {
+            let mut places = circle(5.0, 0.02, 12, 0.0);
+            let out = (places[11] - Point3::new(3.0, 0.0, 0.0)) * (off[0] / 5.0);
+            places[11] += out + nalgebra::Vector3::z() * off[1];
+            longest(&places, 1.1e-3).map(|arc| arc.moves)
+        };
+        assert_eq!([[0.0; 2], [9e-4, 0.0], [0.0, 9e-4]].map(moves), [Some(12); 3]);
+        assert_eq!(moves([9e-4; 2]), Some(10));
     }
 
     /// An arc ends where its moves leave the circle, the plane of its slope or its sense.

@@ -29,7 +29,7 @@ use work::monitor::{self, Cancelled, Monitor};
 use super::along_normals::{Net, NetPlace, Site, connected};
 use super::facing::{Facing, PlaceKind};
 use super::figures::{Bounded, ExcessKind, GougeRegion, Limits, Measurement, NUMERICAL_FLOOR, UncutRegion};
-use piece::WallPiece;
+use piece::{QUARTERS, SHORTEST, WallPiece};
 use reach::Moves;
 use search::{Deepest, Highest, Standing};
 
@@ -80,6 +80,8 @@ pub(super) struct Walls {
 
 struct Strip {
     piece: WallPiece,
+    /// Where the wall comes to below it, at both ends: its floor where other strips lead down there without a gap, else its lower edge.
+    foot: [f64; 2],
     cut: Deepest,
     stands: Highest,
 }
@@ -123,6 +125,7 @@ impl Walls {
                 let near = passing(piece, &moves, moves_near(&bins, &grid, piece), task.reach);
                 Strip {
                     piece: *piece,
+                    foot: piece.low,
                     cut: search::deepest(piece, &moves, &near),
                     stands: standing.highest(piece, &near),
                 }
@@ -148,7 +151,28 @@ impl Walls {
                 near.entry([i, j]).or_default().push(k as u32);
             }
         }
-        Self { strips, near, side, slack }
+        let mut walls = Self { strips, near, side, slack };
+        let feet = work::parallel::map(walls.strips.len(), |k| walls.foot(&walls.strips[k].piece));
+        walls.strips.iter_mut().zip(feet).for_each(|(strip, foot)| strip.foot = foot);
+        walls
+    }
+
+    /// Where the wall below a strip comes to, at both ends: facets that meet aslant are one wall.
+    fn foot(&self, piece: &WallPiece) -> [f64; 2] {
+        let feet = QUARTERS.map(|share| {
+            let u = share * piece.length;
+            let (mut level, floor) = (piece.low_at(u), piece.floor_at(u));
+            while level > floor + TOUCHING {
+                let place = piece.place(u, level);
+                let below = |other: &Strip| other.leads_down(&place, &piece.normal);
+                level = self.near(place.xy()).filter_map(below).reduce(f64::min)?;
+            }
+            Some(floor.min(level))
+        });
+        match feet {
+            [Some(a), Some(b)] => piece.extended([a, b], f64::max),
+            _ => piece.low,
+        }
     }
 
     fn near(&self, q: Point2) -> impl Iterator<Item = &Strip> {
@@ -305,8 +329,18 @@ impl Strip {
         let [u, front] = self.piece.seen_from(p);
         let near = TOUCHING + STEEPEST * front.abs();
         front >= -NUMERICAL_FLOOR
-            && self.piece.low_at(u) <= p.z + near
+            && self.piece.between(self.foot, u) <= p.z + near
             && self.piece.high_at(u) > p.z + TOUCHING
+    }
+
+    /// How far down the strip leads at a place of a wall with a normal; `None` where it does not go on there.
+    fn leads_down(&self, p: &Point3, normal: &Vector2) -> Option<f64> {
+        let [u, front] = self.piece.seen_from(p);
+        let is_its = (-SHORTEST..=self.piece.length + SHORTEST).contains(&u)
+            && front.abs() <= TOUCHING
+            && self.piece.normal.dot(normal) > 0.0;
+        let goes_on = self.piece.low_at(u) < p.z && self.piece.high_at(u) >= p.z - TOUCHING;
+        (is_its && goes_on).then(|| self.piece.low_at(u))
     }
 
     /// Whether a top at a place behind comes to the upper edge.

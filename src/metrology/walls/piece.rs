@@ -13,7 +13,10 @@ use crate::facing::LEAST_FACING;
 const ASIDE: f64 = 1e-3;
 
 /// Strips shorter than this are of no account, mm.
-const SHORTEST: f64 = 1e-9;
+pub(super) const SHORTEST: f64 = 1e-9;
+
+/// Where along a strip its surroundings are looked at, over its length.
+pub(super) const QUARTERS: [f64; 2] = [0.25, 0.75];
 
 /// Floors and tops that rise by more than this from end to end are steps within the strip.
 const STEEPEST: f64 = 5.0;
@@ -64,15 +67,19 @@ impl WallPiece {
     }
 
     pub fn low_at(&self, u: f64) -> f64 {
-        between(self.low, self.share(u))
+        self.between(self.low, u)
     }
 
     pub fn high_at(&self, u: f64) -> f64 {
-        between(self.high, self.share(u))
+        self.between(self.high, u)
+    }
+
+    pub fn floor_at(&self, u: f64) -> f64 {
+        self.between(self.floor, u)
     }
 
     pub fn top_at(&self, u: f64) -> f64 {
-        between(self.top, self.share(u))
+        self.between(self.top, u)
     }
 
     /// The place at `u` and `z`.
@@ -119,7 +126,7 @@ impl WallPiece {
     /// With floor and top, as the design has them a quarter of the length from both ends. `bottom` is the floor where nothing
     /// lies in front.
     fn with_surroundings(mut self, part: &Part, bottom: f64) -> Self {
-        let quarters = [0.25, 0.75].map(|share| share * self.length);
+        let quarters = QUARTERS.map(|share| share * self.length);
         let floor = quarters.map(|u| height_at(part, &self, u, ASIDE).unwrap_or(bottom));
         let top = |u: f64| height_at(part, &self, u, -ASIDE).unwrap_or(self.high_at(u)).max(self.high_at(u));
         let top = quarters.map(top);
@@ -136,8 +143,13 @@ impl WallPiece {
         self
     }
 
+    /// A value at `u` by those at both ends.
+    pub fn between(&self, ends: [f64; 2], u: f64) -> f64 {
+        between(ends, self.share(u))
+    }
+
     /// Heights at the ends by those at the quarters; `choose` of both where a step lies between.
-    fn extended(&self, [a, b]: [f64; 2], choose: fn(f64, f64) -> f64) -> [f64; 2] {
+    pub fn extended(&self, [a, b]: [f64; 2], choose: fn(f64, f64) -> f64) -> [f64; 2] {
         if (b - a).abs() > STEEPEST * self.length {
             return [choose(a, b); 2];
         }

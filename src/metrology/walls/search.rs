@@ -131,19 +131,18 @@ struct Seen {
 impl Standing<'_> {
     /// The highest material before a strip, as far as it counts: not beside its floor.
     pub fn highest(&self, piece: &WallPiece, near: &[u32]) -> Highest {
-        let from = [0, 1].map(|k| piece.low[k].max(piece.floor[k] + self.of_floor));
-        if from[0] >= piece.high[0] && from[1] >= piece.high[1] {
-            return Highest::default();
+        let look = |part: &Part| self.look(piece, part, near);
+        let mut found = Highest::default();
+        let mut open = Vec::new();
+        for u in self.above_floor(piece) {
+            let whole = Part { u, v: [0.0, 1.0], possible: f64::INFINITY, along: true, depth: 0 };
+            let seen = look(&whole);
+            let quarter = 0.25 * (u[1] - u[0]);
+            found.mean += quarter * seen.corners.iter().sum::<f64>();
+            found.share += quarter * seen.corners.iter().filter(|h| **h > self.counted).count() as f64;
+            found.look_at(&seen);
+            open.push(Part { possible: seen.possible, along: seen.is_along(), ..whole });
         }
-        let from = [0, 1].map(|k| from[k].min(piece.high[k]));
-        let look = |part: &Part| self.look(piece, from, part, near);
-        let whole = Part { u: [0.0, 1.0], v: [0.0, 1.0], possible: f64::INFINITY, along: true, depth: 0 };
-        let first = look(&whole);
-        let mean = 0.25 * first.corners.iter().sum::<f64>();
-        let share = 0.25 * first.corners.iter().filter(|h| **h > self.counted).count() as f64;
-        let mut found = Highest { mean, share, ..Highest::default() };
-        found.look_at(&first);
-        let mut open = vec![Part { possible: first.possible, along: first.is_along(), ..whole }];
         let mut closed: f64 = 0.0;
         for _ in 0..MOST_PARTS {
             let next = (0..open.len()).max_by(|a, b| open[*a].possible.total_cmp(&open[*b].possible));
@@ -166,10 +165,33 @@ impl Standing<'_> {
         found
     }
 
-    fn look(&self, piece: &WallPiece, from: [f64; 2], part: &Part, near: &[u32]) -> Seen {
+    /// The lowest place at a share of the length that is not the floor's.
+    fn from(&self, piece: &WallPiece, share: f64) -> f64 {
+        let u = share * piece.length;
+        piece.low_at(u).max(piece.floor_at(u) + self.of_floor).min(piece.high_at(u))
+    }
+
+    /// The shares of a strip where it rises above what is its floor's: up to each, both of its borders there are straight.
+    fn above_floor(&self, piece: &WallPiece) -> Vec<[f64; 2]> {
+        let mut ends = vec![0.0, 1.0];
+        for edge in [piece.low, piece.high] {
+            let [a, b] = [0, 1].map(|k| piece.floor[k] + self.of_floor - edge[k]);
+            if a * b < 0.0 {
+                ends.push(a / (a - b));
+            }
+        }
+        ends.sort_by(f64::total_cmp);
+        let rises = |[a, b]: &[f64; 2]| {
+            let middle = 0.5 * (a + b);
+            b > a && self.from(piece, middle) < piece.high_at(middle * piece.length)
+        };
+        ends.windows(2).map(|pair| [pair[0], pair[1]]).filter(rises).collect()
+    }
+
+    fn look(&self, piece: &WallPiece, part: &Part, near: &[u32]) -> Seen {
         let at = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
             let (s, v) = (part.u[i], part.v[j]);
-            let low = from[0] + (from[1] - from[0]) * s;
+            let low = self.from(piece, s);
             let u = s * piece.length;
             [u, low + (piece.high_at(u) - low) * v]
         });

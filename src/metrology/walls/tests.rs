@@ -54,11 +54,15 @@ fn block() -> Part {
 }
 
 fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
+    measured_on(0.1, part, cutter, path)
+}
+
+fn measured_on(cell: f64, part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
     let mut area = part.bounds();
     (area.min.x, area.min.y, area.max.x, area.max.y) =
         (area.min.x - 2.0, area.min.y - 2.0, area.max.x + 2.0, area.max.y + 2.0);
     area.max.z += 1.0;
-    let grid = Grid::covering(&area, 0.1, 8, 1 << 30).unwrap();
+    let grid = Grid::covering(&area, cell, 8, 1 << 30).unwrap();
     let cut = cut(ZMap::block(grid, area.max.z), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
@@ -189,4 +193,63 @@ fn an_inner_corner_keeps_what_the_cutter_does_not_reach() {
     assert_eq!(measured.uncut.region_count % 4, 0, "{:?}", measured.uncut);
     assert!(measured.gouge.max_depth_mm < 1e-6, "{:?}", measured.gouge);
     assert!(measured.excess.unreached.error_bound_mm < 2e-3, "{:?}", measured.excess);
+}
+
+/// A step from a floor at z = 1 up to `high` over it, along y = 4 on `length` mm, as a cutter of a radius leaves it: rows over the top, rows
+/// over the floor from `aside` before the step on, and once around the outer walls.
+fn step(length: f64, high: f64, radius: f64, aside: f64) -> (Part, Toolpath) {
+    let floor = 1.0;
+    let top = floor + high;
+    let part = steps(
+        [[0.0, length / 3.0, length / 1.5, length], [0.0, 4.0, 6.0, 8.0]],
+        [[floor; 3], [top; 3], [top; 3]],
+    );
+    let rows = |from: f64, z: f64| {
+        (0..=40).flat_map(move |k| {
+            let ends = if k % 2 == 0 { [-3.0, length + 3.0] } else { [length + 3.0, -3.0] };
+            ends.map(|x| Point3::new(x, from - 0.1 * f64::from(k), z))
+        })
+    };
+    let [low, far] = [-radius, length + radius];
+    let around = [[low, low], [far, low], [far, 8.0 + radius], [low, 8.0 + radius], [low, low]];
+    let around = around.map(|[x, y]| Point3::new(x, y, -radius));
+    let above = |x: f64, y: f64| [Point3::new(x, y, 20.0)];
+    let path = path_through(
+        rows(8.0, top)
+            .chain(above(-3.0, 4.0 - aside))
+            .chain(rows(4.0 - aside, floor))
+            .chain(above(low, low))
+            .chain(around),
+    );
+    (part, path)
+}
+
+/// The facets of a long wall meet aslant: beside the lower one, far below the top, the wall above it stands before the floor as well.
+#[test]
+fn floors_beside_facets_that_meet_aslant_belong_to_the_wall() {
+    let radius = 3.0;
+    let cutter = Cutter::flat(2.0 * radius).unwrap();
+    for (cell, thick) in [(0.1, 0.02), (0.05, 0.02), (0.1, 0.3)] {
+        let (part, path) = step(90.0, 1.0, radius, radius + thick);
+        let measured = measured_on(cell, &part, &cutter, &path);
+        let highest = measured.excess.highest;
+        assert!((highest.max_mm - thick).abs() < 1e-6 && highest.error_bound_mm < 2e-3, "{cell} {highest:?}");
+        assert_eq!(measured.uncut.region_count > 0, thick > LIMITS.uncut, "{:?}", measured.uncut);
+    }
+}
+
+/// What a ball leaves at the foot of a step that is little higher than the uncut tolerance is the same on all cells: the floor's up to the
+/// uncut tolerance, and above that a few µm before the wall.
+#[test]
+fn what_stands_at_the_foot_of_a_low_step_does_not_depend_on_cells() {
+    let (radius, aside) = (1.5f64, 0.41);
+    let high = radius - (radius * radius - aside * aside).sqrt();
+    let (part, path) = step(9.0, high, radius, aside);
+    let cutter = Cutter::ball(2.0 * radius).unwrap();
+    assert!(high > LIMITS.uncut + 5e-3, "{high}");
+    for cell in [0.15, 0.1, 0.05, 0.03] {
+        let found = measured_on(cell, &part, &cutter, &path).excess;
+        assert!((found.highest.max_mm - LIMITS.uncut).abs() < 1e-3, "{cell} {found:?}");
+        assert!(found.highest.error_bound_mm < 2e-3, "{cell} {found:?}");
+    }
 }

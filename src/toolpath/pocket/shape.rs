@@ -210,7 +210,19 @@ impl Pocket {
                 let Some(inward) = left(&[a, b]).filter(|_| !self.open.contains(&[a, b])) else { continue };
                 let at = |share: f64| a + (b - a) * share;
                 let places = ((b - a).norm() / (WALL_STEP * radius)).ceil();
-                let reached = fitting(places, |share| centres.sides().distance(&at(share)) <= radius + off);
+                // A cutter that touches no more than the end of a side, from beyond it, does not come to the side.
+                let touches = |place: &Point2| {
+                    let sides = centres.sides();
+                    let nearest = sides.nearest(place).filter(|near| near.distance <= radius + off);
+                    nearest.is_some_and(|near| {
+                        let [from, to] = sides.segments()[near.segment as usize].ends;
+                        let way = from + (to - from) * near.share - place;
+                        let (front, aside) = (way.dot(&inward), way.perp(&inward));
+                        front > 0.0
+                            && front - ((radius - aside) * (radius + aside)).max(0.0).sqrt() <= 2.0 * off
+                    })
+                };
+                let reached = fitting(places, |share| touches(&at(share)));
                 found.extend(
                     reached.iter().map(|ends| WallStretch { ends: ends.map(at), inward: [inward; 2] }),
                 );
@@ -426,6 +438,26 @@ mod tests {
         let slot = Pocket { off_drawing, ..Pocket::new(Region::nested(vec![circle(r, n)]).unwrap().0, 1.0) };
         assert!((slot.reached_wall_length(4.9) - slot.wall_length()).abs() < 1e-9);
         assert_eq!(slot.reached_wall_length(5.1), 0.0);
+    }
+
+    /// Beside an island is no room for it, and it turns above the corner: of that side it touches no more than the end.
+    #[test]
+    fn a_side_that_it_touches_at_its_end_alone_is_not_reached() {
+        let outline =
+            points(&[(0., 0.), (14., 0.), (14., 4.2557), (4.2557, 4.2557), (4.2557, 12.), (0., 12.)]);
+        let island = points(&[(1.4956, 7.4956), (2.7601, 7.4956), (2.7601, 8.7601), (1.4956, 8.7601)]);
+        let pocket = Pocket::new(Region::nested(vec![outline, island]).unwrap().0, 2.5);
+        let reached = pocket.reached_walls(1.5);
+        let beside = |wall: &WallStretch| {
+            let normal = wall.inward[0] + wall.inward[1];
+            let on_side = |x: f64| wall.ends.iter().all(|end| (end.x - x).abs() < 1e-9);
+            on_side(2.7601) && normal.x > 1.9 || on_side(1.4956) && normal.x < -1.9
+        };
+        assert!(!reached.iter().any(beside), "{reached:?}");
+        let above =
+            |wall: &&WallStretch| wall.inward[0].y == 1.0 && wall.ends.iter().all(|end| end.y == 8.7601);
+        let length: f64 = reached.iter().filter(above).map(WallStretch::length).sum();
+        assert!((length - 1.2645).abs() < 0.01, "{length}");
     }
 
     fn square() -> Pocket {
