@@ -100,7 +100,11 @@ fn where_none_can_be_planned_each_says_why() {
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains("none of the 3 toolpaths could be planned"), "{words}");
-    for told in ["\"first\":", "\"second\": the toolpath before it could not be planned", "\"third\":"] {
+    for told in [
+        "\"first\":",
+        "\"second\": waterline cannot plan this part: the toolpath before it could not be planned",
+        "\"third\":",
+    ] {
         assert!(words.contains(told), "{told}: {words}");
     }
 }
