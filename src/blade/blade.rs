@@ -10,7 +10,7 @@
 
 use super::loft;
 use super::sections::{SectionError, SectionSides, Sections};
-use crate::fairing::{Faired, Fairing, FairingError, FairingMethod};
+use crate::fairing::{Faired, Fairing, FairingError, FairingMethod, outlier};
 use crate::loft::{Loft, LoftError, LoftSection};
 use crate::{loft_as_published, loft_of_offsets};
 use geometry::{CubicSpline, Isometry3, NurbsSurface, Point2, SplineError, Vector2, Vector3};
@@ -214,22 +214,56 @@ impl Blade {
         self.places.iter().map(|(k, _)| self.parameters[*k].as_slice()).collect()
     }
 
-    /// What fairing did, in words.
+    /// What fairing did, and a point that lies off its neighbours, in words.
     pub fn notes(&self) -> Vec<String> {
         let faired: Vec<&Faired> = self.sections.iter().filter_map(|s| s.faired.as_ref()).collect();
         let count = faired.len();
         if count == 0 {
-            return Vec::new();
+            return self.outlier().into_iter().collect();
         }
         let most = faired.iter().map(|f| f.furthest()).fold(0.0, f64::max);
         let energy = |k: usize| faired.iter().map(|f| f.jump_energy[k]).sum::<f64>();
         let (before, after) = (energy(0), energy(1));
         let rest = if before > 0.0 { 100.0 * after / before } else { 100.0 };
-        vec![format!(
+        let mut notes = vec![format!(
             "{count} section curves were faired: points moved by {:.1} µm at most, {rest:.2} % is left of the squared jumps of the \
              third derivative",
             1e3 * most
-        )]
+        )];
+        notes.extend(self.outlier());
+        notes
+    }
+
+    /// A point that lies off its neighbours, in words, the farthest of its kind. Where more than half of the sections have one it is their shape.
+    fn outlier(&self) -> Option<String> {
+        let of_curve = |curve: BladeCurve| {
+            let all: Vec<&BladeSection> =
+                self.sections.iter().filter(|section| section.curve == curve).collect();
+            let found: Vec<(f64, usize, &BladeSection)> = all
+                .iter()
+                .filter_map(|section| outlier(&section.spline).map(|(k, off)| (off, k, *section)))
+                .collect();
+            if 2 * found.len() > all.len() { Vec::new() } else { found }
+        };
+        let found =
+            [BladeCurve::Pressure, BladeCurve::Suction, BladeCurve::Around].into_iter().flat_map(of_curve);
+        let (off, k, section) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let at = section.spline.points()[k];
+        let moved = |faired: &Faired| {
+            faired.moved.iter().find(|(moved, _)| *moved == k).map_or(0.0, |(_, way)| way.norm())
+        };
+        let moved = section
+            .faired
+            .as_ref()
+            .map_or(String::new(), |faired| format!("; fairing moved it by {:.1} µm", 1e3 * moved(faired)));
+        Some(format!(
+            "a point of the {} at height {} lies {:.1} µm off the curve through its neighbours: x {} y {}{moved}. Check it in the table",
+            section.curve,
+            section.height,
+            1e3 * off,
+            at.x,
+            at.y
+        ))
     }
 
     /// Surfaces through the sections offset outward by `distance`, mm, each in its plane. There may be more of them than

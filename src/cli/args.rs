@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgGroup, Args, Parser, Subcommand};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
@@ -211,12 +211,13 @@ pub struct CheckOptions {
 
 /// What scallop is asked about. Lengths in mm.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("asked").args(["step", "scallop", "table"]).required(true))]
 pub struct ScallopOptions {
     /// The cutter, in one of the short forms of its families.
     #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()))]
     pub cutter: Cutter,
     /// Distance of passes along the surface: answers the scallop height.
-    #[arg(long, value_name = "MM", required_unless_present_any = ["scallop", "table"])]
+    #[arg(long, value_name = "MM")]
     pub step: Option<f64>,
     /// Scallop height: answers the step.
     #[arg(long, value_name = "MM", conflicts_with = "step")]

@@ -412,6 +412,9 @@ mod tests {
         ] {
             assert_eq!(asked(&format!("millstream scallop {usage}")), Err("usage 2".into()), "{usage}");
         }
+        let alone = Arguments::try_parse_from(["millstream", "scallop", "--cutter", "ball:6"]);
+        let words = alone.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(["--step", "--scallop", "--table"].iter().all(|way| words.contains(way)), "{words}");
         let refused = |line: &str| asked(&format!("millstream scallop {line}")).unwrap_err();
         let limit = refused("--cutter ball:10 --step 0.5 --concave 4");
         assert!(limit.contains("machinable limit") && limit.contains("less than 8 mm"), "{limit}");

@@ -4,6 +4,7 @@ use miette::Diagnostic;
 
 use geometry::{MeshError, Point3};
 use metrology::EngineError;
+use motion::PathError;
 use report::ReportError;
 use scene::{LoadError, Scene, SceneError};
 use sim::{GridError, OppositeAxes, VoxelError};
@@ -54,6 +55,15 @@ pub enum JobError {
         /// What the planner said.
         reason: PlanError,
     },
+    /// None of several toolpaths could be planned.
+    #[error("{scene}: none of the {} toolpaths could be planned{}", reasons.len(), listed(reasons))]
+    #[diagnostic(help("change or delete those [[toolpath]] in the scene"))]
+    NonePlanned {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// The name of each, and why.
+        reasons: Vec<(String, String)>,
+    },
     /// No plan of a toolpath takes as little time as it is compared at.
     #[error(
         "{scene}: the toolpath \"{name}\" takes {least:.2} minutes or more, at scallops of {highest} mm already, and {asked} were asked for"
@@ -81,6 +91,17 @@ pub enum JobError {
         name: String,
         /// Why not.
         reason: String,
+    },
+    /// The path of a toolpath cannot be cut.
+    #[error("{scene}: the toolpath \"{name}\" cannot be cut: {reason}")]
+    #[diagnostic(help("change that [[toolpath]] in the scene"))]
+    Path {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// Which move, and why.
+        reason: PathError,
     },
     /// The engine does not know tilted cutters.
     #[error(
@@ -185,7 +206,22 @@ pub enum JobError {
     Cancelled(#[from] Cancelled),
 }
 
+/// Toolpaths with their reasons, a line each.
+fn listed(reasons: &[(String, String)]) -> String {
+    reasons.iter().map(|(name, reason)| format!("\n\"{name}\": {reason}")).collect()
+}
+
 impl JobError {
+    /// Why no toolpath has a path: the error of the only one, or the reasons of all, each with the toolpath's name.
+    pub(crate) fn of_all(scene: &Scene, mut refused: Vec<(String, Self)>) -> Self {
+        if refused.len() == 1 {
+            return refused.remove(0).1;
+        }
+        let reason = |error: &Self| error.why_not_planned().unwrap_or_else(|| error.to_string());
+        let reasons = refused.iter().map(|(name, error)| (name.clone(), reason(error))).collect();
+        Self::NonePlanned { scene: scene.source.name.clone(), reasons }
+    }
+
     /// For grids that do not fit: `map_err(JobError::grid(scene))`.
     pub(crate) fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
         |reason| Self::Grid { scene: scene.source.name.clone(), reason }
@@ -197,6 +233,7 @@ impl JobError {
         match reason {
             EngineError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             EngineError::Grid(reason) => Self::Grid { scene, reason },
+            EngineError::Path(reason) => Self::Path { scene, name, reason },
             EngineError::Turn(reason) => Self::Turn { scene, name, reason },
             EngineError::Voxels(reason) => Self::Voxels { scene, name, reason },
             EngineError::Places { spacing, needed_mib, allowed_mib, fitting } => {

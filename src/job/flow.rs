@@ -29,7 +29,7 @@ impl Session {
     /// planned is a row with its reason, and fails the run.
     ///
     /// # Errors
-    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned.
+    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned, with the reason of each.
     pub fn run(&self, monitor: &dyn Monitor) -> Result<RunReport, JobError> {
         self.run_each(monitor, &mut |_| Ok::<(), JobError>(()))
     }
@@ -43,7 +43,7 @@ impl Session {
         monitor: &dyn Monitor,
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
-        let (mut rows, mut refused, mut left) = (Vec::new(), None, Vec::new());
+        let (mut rows, mut refused, mut left) = (Vec::new(), Vec::new(), Vec::new());
         let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
         for request in &self.scene.toolpaths {
             monitor.belongs_to(&request.name);
@@ -76,14 +76,14 @@ impl Session {
                         answers_itself(rows.last_mut(), &mut left);
                     }
                     rows.push(not_planned(request, reason));
-                    refused = refused.or(Some(error));
+                    refused.push((request.name.clone(), error));
                 }
             }
         }
-        match refused {
-            Some(error) if rows.iter().all(|row| row.measured().is_none()) => Err(error.into()),
-            _ => Ok(self.report(rows)),
+        if refused.is_empty() || rows.iter().any(|row| row.measured().is_some()) {
+            return Ok(self.report(rows));
         }
+        Err(JobError::of_all(&self.scene, refused).into())
     }
 
     /// The report of the scene's toolpaths.

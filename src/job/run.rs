@@ -93,6 +93,11 @@ impl Run<'_> {
     }
 
     /// For voxels that do not fit.
+    pub fn heights(&self) -> impl Fn(sim::CutError) -> JobError {
+        |reason| JobError::engine(self.scene(), &self.request.name, reason.into())
+    }
+
+    /// The same where voxels are cut.
     pub fn voxels(&self) -> impl Fn(sim::VoxelError) -> JobError {
         |reason| JobError::engine(self.scene(), &self.request.name, reason.into())
     }

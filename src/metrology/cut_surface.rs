@@ -6,7 +6,7 @@
 //! on it does not depend on the grid, except that a move which is lowest nowhere on a cell centre
 //! nor next to one that is would be missed.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use geometry::{Point3, Vector3, share_on};
 use motion::Toolpath;
@@ -55,7 +55,13 @@ pub struct CutSurface<'a> {
     pub path: &'a Toolpath,
     /// How low the tip comes on each move and those of its pass just before and after it, mm.
     lowest_tips: Arc<[f64]>,
+    /// By blocks of cells, how high all that stood surely stands in them, mm.
+    standing: OnceLock<Vec<f64>>,
 }
+
+/// Cells along the side of such a block: a line along a normal leaves what stands there in one step. In larger ones some cell is cut
+/// deeper more often.
+const BLOCK: usize = 16;
 
 /// Most steps along the program in search of a lower move. Reached only where moves are some
 /// hundred times shorter than a cell.
@@ -69,7 +75,7 @@ impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
     pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
         let lowest_tips = lowest_tips(path).into();
-        Self { envelope, cut, path, lowest_tips }
+        Self { envelope, cut, path, lowest_tips, standing: OnceLock::new() }
     }
 
     /// What the same path has cut of another z-map.
@@ -82,6 +88,7 @@ impl<'a> CutSurface<'a> {
             cut,
             path: self.path,
             lowest_tips: Arc::clone(&self.lowest_tips),
+            standing: OnceLock::new(),
         }
     }
 
@@ -237,6 +244,10 @@ const MOST_ITERATIONS: usize = 70;
 /// A ray along the normal is followed cell by cell at most this far, in steps of half a cell.
 const MOST_MARCHING_STEPS: usize = 20_000;
 
+/// Steps from the end of a block into the next one, and those between two questions in a block that has cuts.
+const AT_ENDS: usize = 2;
+const STEPS_BETWEEN: usize = 8;
+
 impl CutSurface<'_> {
     /// Height to which the lowest of `moves` cuts above or below a point, mm; infinite where none passes.
     pub(crate) fn height_of(&self, moves: &[u32], at: &Point3) -> f64 {
@@ -295,7 +306,8 @@ impl CutSurface<'_> {
                 let cell = self.cut.grid.cell_at(q.x, q.y);
                 lowest > q.z && cell.is_some_and(|cell| self.stands(q, cell))
             };
-            self.march(p, n, vertical, &at, &stands)
+            let standing_steps = |q: &Point3, step: f64| self.standing_steps(q, n, step, lowest);
+            self.march(p, n, vertical, &at, &stands, &standing_steps)
                 .and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
         };
         Some(found.unwrap_or(Deviation {
@@ -324,6 +336,53 @@ impl CutSurface<'_> {
         rows.all(|j| columns.clone().all(|i| is_left(self.cut.grid.index(i, j))))
     }
 
+    /// How many steps of a line from a place along its normal surely lead to places that [`Self::stands`], where no other move comes
+    /// lower than `lowest`, mm.
+    fn standing_steps(&self, from: &Point3, n: &Vector3, step: f64, lowest: f64) -> usize {
+        let grid = &self.cut.grid;
+        let Some((i, j)) = grid.cell_at(from.x, from.y) else { return 0 };
+        let (bi, bj) = (i / BLOCK, j / BLOCK);
+        let blocks = self.standing.get_or_init(|| self.standing_blocks());
+        let up = if n.z > 0.0 {
+            (lowest.min(blocks[bj * grid.nx.div_ceil(BLOCK) + bi]) - from.z) / n.z
+        } else {
+            0.0
+        };
+        let leaves = |at: f64, way: f64, first: f64, b: usize, n: usize| {
+            let low = first + ((b * BLOCK) as f64 - 0.5) * grid.cell;
+            let high = first + (((b + 1) * BLOCK).min(n) as f64 - 0.5) * grid.cell;
+            if way == 0.0 { f64::INFINITY } else { (if way > 0.0 { high } else { low } - at) / way }
+        };
+        let way = up.min(leaves(from.x, n.x, grid.origin.x, bi, grid.nx)).min(leaves(
+            from.y,
+            n.y,
+            grid.origin.y,
+            bj,
+            grid.ny,
+        ));
+        // One step less than there is room for: the ends are rounded.
+        ((way / step) as usize).saturating_sub(1).min(MOST_MARCHING_STEPS)
+    }
+
+    /// Of each block of cells, row by row, how high all that stood surely stands in each of its cells, and those around them, mm.
+    fn standing_blocks(&self) -> Vec<f64> {
+        let (grid, cut) = (&self.cut.grid, self.cut);
+        let level = |k: usize| match cut.cut_by[k] {
+            NOT_CUT if cut.shape.is_some() => f64::NEG_INFINITY,
+            NOT_CUT => f64::from(cut.height[k]),
+            by => self.lowest_tips[by as usize],
+        };
+        let around = |b: usize, n: usize| (b * BLOCK).saturating_sub(1)..((b + 1) * BLOCK + 1).min(n);
+        let (columns, rows) = (grid.nx.div_ceil(BLOCK), grid.ny.div_ceil(BLOCK));
+        (0..columns * rows)
+            .map(|k| {
+                let cells = around(k / columns, grid.ny)
+                    .flat_map(|j| around(k % columns, grid.nx).map(move |i| grid.index(i, j)));
+                cells.map(level).fold(f64::INFINITY, f64::min)
+            })
+            .collect()
+    }
+
     /// As [`Self::at`]; beside the grid by the moves that cut its outermost cells, as far as they pass.
     fn near(&self, x: f64, y: f64) -> Option<CutPoint> {
         let grid = &self.cut.grid;
@@ -334,7 +393,8 @@ impl CutSurface<'_> {
     }
 
     /// Follows the normal in steps of half a cell to the first change of side; the bracket
-    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` by the tips of the tools around.
+    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` by the tips of the tools around,
+    /// and many steps are taken at once where that is known of all of them.
     fn march(
         &self,
         p: &Point3,
@@ -342,10 +402,19 @@ impl CutSurface<'_> {
         vertical: f64,
         at: &dyn Fn(f64, f64) -> Option<CutPoint>,
         stands: &dyn Fn(&Point3) -> bool,
+        standing_steps: &dyn Fn(&Point3, f64) -> usize,
     ) -> Option<(f64, f64)> {
         let step = 0.5 * self.cut.grid.cell * vertical.signum();
-        let mut t = 0.0;
-        for _ in 0..MOST_MARCHING_STEPS {
+        let (mut t, mut taken, mut asked_at) = (0.0, 0, 0);
+        while taken < MOST_MARCHING_STEPS {
+            if vertical > 0.0 && taken >= asked_at {
+                let known = standing_steps(&(p + n * t), step).min(MOST_MARCHING_STEPS - taken);
+                // The same places as step by step, to the last bit.
+                (0..known).for_each(|_| t += step);
+                taken += known;
+                asked_at = taken + if known > 0 { AT_ENDS } else { STEPS_BETWEEN };
+            }
+            taken += 1;
             let next = t + step;
             let q = p + n * next;
             if vertical > 0.0 && stands(&q) {
@@ -465,5 +534,36 @@ mod tests {
             let found = surface.along_normal_with(&p, &n, &further).unwrap();
             assert!((found.distance - exact).abs() < 1e-8, "{further:?}: {} {exact}", found.distance);
         }
+    }
+
+    /// Steps that are taken at once lead to places where all that stood is left, and there are many of them in a block that nothing cut.
+    #[test]
+    fn steps_taken_at_once_lead_through_what_stands() {
+        let cutter = Cutter::flat(4.0).unwrap();
+        let path = path_through([
+            Point3::new(2.0, 3.0, 1.0),
+            Point3::new(9.0, 3.0, 1.0),
+            Point3::new(9.0, 8.0, 4.0),
+        ]);
+        let grid = Grid { origin: Point2::new(0.05, 0.05), cell: 0.1, nx: 210, ny: 130 };
+        let cut = cut_reference(&ZMap::block(grid, 9.0), &cutter, &path, &Silent).unwrap();
+        let surface = CutSurface::new(Envelope::new(cutter, &path), &cut, &path);
+        let (step, mut most) = (0.5 * grid.cell, 0);
+        for n in [[0.6, 0.0, 0.8], [-0.6, 0.48, 0.64], [0.0, -0.96, 0.28], [0.0, 0.0, 1.0]] {
+            let n = Vector3::from(n);
+            for k in 0..400 {
+                let from = Point3::new(f64::from(k % 20) * 1.04, f64::from(k / 20) * 0.64, f64::from(k % 7));
+                for lowest in [9.0, 3.0] {
+                    let steps = surface.standing_steps(&from, &n, step, lowest);
+                    most = most.max(steps);
+                    let all = (1..=steps).map(|k| from + n * (step * k as f64));
+                    for q in all {
+                        let cell = grid.cell_at(q.x, q.y).unwrap();
+                        assert!(q.z < lowest && surface.stands(&q, cell), "{from} {n} {q}");
+                    }
+                }
+            }
+        }
+        assert!(most > 20, "{most}");
     }
 }

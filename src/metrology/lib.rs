@@ -40,6 +40,7 @@ mod flat_scene;
 mod inspected;
 mod inspection;
 mod measure;
+mod measured_stock;
 mod meetings;
 mod offset_distance;
 mod pairs;
@@ -79,7 +80,9 @@ pub use figures::{
     Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,
     Measurement, PathFigures, RidgePlace, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,
 };
-pub use measure::{measure, measure_with_walls};
+pub use measure::measure;
+pub use measured_stock::MeasureError;
+
 pub use meetings::Meetings;
 pub use offset_distance::{
     OffsetDistance, OffsetFigures, OffsetPoints, SingularPlaceFigures, measure_offset, offset_figures,

@@ -11,6 +11,7 @@ use super::figures::{
 };
 use super::inspected::inspect;
 use super::inspection::Inspection;
+use super::measured_stock::{MeasureError, check_stock};
 use super::meetings::Meetings;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement, open_bounds};
@@ -23,15 +24,18 @@ use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{Cutters, Toolpath};
 use part::Part;
-use sim::{Envelope, ZMap};
-use work::monitor::{Cancelled, Monitor};
+use sim::{CutError, Envelope, ZMap};
+use work::monitor::Monitor;
 
 /// Measures `cut`, the stock after `path`, against `part`, looking closer until the error bounds of the
 /// greatest scallop, gouge and uncut height are the asked ones. Where they do not come down to that, a note
 /// in [`Measurement::refined`] says so.
 ///
+/// The tool must be upright all along `path`, and `cut` must be what [`sim::cut`] left along this path with this cutter, of
+/// stock that lies over all of the part.
+///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`MeasureError`] where that is not so, or when the monitor says so.
 pub fn measure(
     part: &Part,
     cutter: &Cutter,
@@ -40,15 +44,18 @@ pub fn measure(
     limits: &Limits,
     asked: &Asked,
     monitor: &dyn Monitor,
-) -> Result<Measurement, Cancelled> {
-    measure_with_walls(part, &cutter.into(), path, cut, limits, asked, None, monitor)
+) -> Result<Measurement, MeasureError> {
+    path.check_upright()?;
+    check_stock(part, cutter, path, cut, monitor)?;
+    Ok(measure_with_walls(part, &cutter.into(), path, cut, limits, asked, None, monitor)?)
 }
 
-/// As [`measure`], each move by its own cutter, and the part's vertical walls too, as far as they are walls to the path.
+/// As [`measure`], each move by its own cutter, and the part's vertical walls too, as far as they are walls to the path. Path
+/// and stock are not checked: an engine has just cut the one along the other.
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
-pub fn measure_with_walls(
+/// [`CutError::Cancelled`] when the monitor says so.
+pub(crate) fn measure_with_walls(
     part: &Part,
     cutters: &Cutters,
     path: &Toolpath,
@@ -57,7 +64,7 @@ pub fn measure_with_walls(
     asked: &Asked,
     facing: Option<&Facing<'_>>,
     monitor: &dyn Monitor,
-) -> Result<Measurement, Cancelled> {
+) -> Result<Measurement, CutError> {
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
     let bound = asked.error_bound;
     let grid = cut.grid;

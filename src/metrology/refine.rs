@@ -19,8 +19,8 @@ use super::ridges::Hidden;
 use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
 use motion::Toolpath;
-use sim::{Grid, Shape, cut, cut_in_turn};
-use work::monitor::{self, Cancelled, Monitor};
+use sim::{CutError, Grid, Shape, cut, cut_in_turn};
+use work::monitor::{self, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
 /// less of what each rectangle costs, which grows with the moves of the path.
@@ -92,7 +92,7 @@ impl Refinement<'_> {
         dips: &[Dip],
         measured: &mut Measurement,
         monitor: &dyn Monitor,
-    ) -> Result<CloserLook, Cancelled> {
+    ) -> Result<CloserLook, CutError> {
         let bound = self.asked.error_bound;
         let mut refined = CloserLook { finest_cell: self.coarse.grid.cell, ..CloserLook::default() };
         let scallop = measured.scallop.max_mm.unwrap_or(0.0);
@@ -191,7 +191,7 @@ impl Refinement<'_> {
         greatest: &mut GreatestSoFar,
         refined: &mut CloserLook,
         monitor: &dyn Monitor,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), CutError> {
         let grid = &self.coarse.grid;
         // One cell more on every side, for the surroundings.
         let span = |t: usize, n: usize| ((t * SIDE).saturating_sub(1), ((t + 1) * SIDE + 1).min(n));
@@ -271,7 +271,7 @@ impl Refinement<'_> {
     }
 
     /// What is measured on a fine grid, and how high material may be that its cells missed as well.
-    fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), Cancelled> {
+    fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), CutError> {
         let (coarse, within) = (self.coarse, Within(monitor));
         let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top, &within)?;
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;

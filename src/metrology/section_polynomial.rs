@@ -44,10 +44,13 @@ const BESIDE: usize = 2;
 /// Share of the passes that must lie on lines of constant parameter; the rest are short ones along borders.
 const MOSTLY: f64 = 0.9;
 
+/// A pair counts where at least this share of its ridge was measured: others have cut away most of the rest, if not all of it.
+const LEFT: f64 = 0.5;
+
 /// Heights by polynomial sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PolynomialFigures {
-    /// Pairs of neighbouring passes.
+    /// Pairs of neighbouring passes whose ridge is left for the most part.
     pub pair_count: usize,
     /// Places at which a height was calculated.
     pub places: usize,
@@ -114,8 +117,8 @@ struct Sum {
     max: f64,
 }
 
-/// Heights between the passes of a path, beside those measured; `None` where passes are no lines of constant parameter, the cutter
-/// is no ball, or no two passes lie beside each other.
+/// Heights between the passes of a path, where a ridge of theirs was measured, beside those measured; `None` where passes are no lines of
+/// constant parameter, the cutter is no ball, or no two passes lie beside each other.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -142,6 +145,10 @@ pub fn polynomial_figures(
             }
         }
     }
+    // Later passes across them take the ridges of a coarse path away.
+    let ridges: BTreeMap<[u32; 2], f64> =
+        measured.pairs.iter().map(|pair| (pair.passes, pair.ridge_length_mm)).collect();
+    pairs.retain(|passes, sum| ridges.get(passes).is_some_and(|length| *length >= LEFT * sum.length));
     let all = pairs.values().fold(Sum::default(), |a, b| Sum {
         places: a.places + b.places,
         length: a.length + b.length,
@@ -287,6 +294,7 @@ fn across(part: &Part, radius: f64, lines: &[Line], station: usize, pairs: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ScallopPair;
     use geometry::{AnalyticShape, AnalyticSurface, Point2, Point3};
     use motion::Move;
     use part::Patch;
@@ -294,6 +302,13 @@ mod tests {
 
     /// Straight passes of a ball of 6 mm over a plane of 20 × 20 mm.
     fn figures(passes: &[[Point2; 2]]) -> Option<PolynomialFigures> {
+        let all = 0..passes.len() as u32;
+        let pairs: Vec<[u32; 2]> = all.clone().flat_map(|a| all.clone().map(move |b| [a, b])).collect();
+        figures_where(passes, &pairs)
+    }
+
+    /// The same where ridges were measured between some pairs alone.
+    fn figures_where(passes: &[[Point2; 2]], left: &[[u32; 2]]) -> Option<PolynomialFigures> {
         let shape = AnalyticShape::Plane { height: 0.0 };
         let patch = Patch::Analytic(AnalyticSurface::new(shape, [[0.0, 20.0]; 2]).unwrap());
         let part = Part::from_patches(vec![patch], 0.002).unwrap();
@@ -310,7 +325,46 @@ mod tests {
         }
         let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves);
         let cutter = Cutter::ball(6.0).unwrap();
-        polynomial_figures(&part, &cutter, &path, &PairFigures::default(), &Silent).unwrap()
+        let pairs = left.iter().map(|passes| measured(*passes)).collect();
+        let measured = PairFigures { pairs, ..PairFigures::default() };
+        polynomial_figures(&part, &cutter, &path, &measured, &Silent).unwrap()
+    }
+
+    fn measured(passes: [u32; 2]) -> ScallopPair {
+        ScallopPair {
+            passes,
+            crossings: 100,
+            ridge_length_mm: 20.0,
+            measured_mean_mm: 0.01,
+            measured_max_mm: 0.01,
+            calculated_places: 0,
+            parallel: true,
+            calculated_mean_mm: None,
+            calculated_max_mm: None,
+            section_mean_mm: None,
+            calculated_over_measured: None,
+            greatest_difference_mm: None,
+        }
+    }
+
+    /// Coarse passes, and finer ones across them: what stood between the coarse ones was cut away.
+    #[test]
+    fn ridges_that_were_cut_away_do_not_count() {
+        let across: Vec<[Point2; 2]> = (0..5)
+            .map(|k| 2.0 + 4.0 * f64::from(k))
+            .map(|x| [Point2::new(x, 0.5), Point2::new(x, 19.5)])
+            .collect();
+        let along =
+            (0..39).map(|k| 0.5 + 0.5 * f64::from(k)).map(|y| [Point2::new(0.5, y), Point2::new(19.5, y)]);
+        let all: Vec<[Point2; 2]> = across.into_iter().chain(along).collect();
+        let left: Vec<[u32; 2]> = (5..43).map(|k| [k, k + 1]).collect();
+        let found = figures_where(&all, &left).unwrap();
+        let exact = 3.0 - (9.0 - 0.0625f64).sqrt();
+        assert_eq!(found.pair_count, 38);
+        for height in [found.mean_mm, found.max_mm] {
+            assert!((height / exact - 1.0).abs() < 1e-3, "{height} {exact}");
+        }
+        assert_eq!(figures_where(&all, &[]), None);
     }
 
     /// Passes `step` mm apart in two pieces each, which turn by a slope.

@@ -2,7 +2,8 @@
 
 use crate::figures::Limits;
 use crate::flat_scene::plane;
-use crate::{Asked, Measurement, measure, measure_with_walls};
+use crate::measure::measure_with_walls;
+use crate::{Asked, Measurement, measure};
 use cutter::Cutter;
 use geometry::{Aabb, AnalyticShape, AnalyticSurface, Point3, Vector3};
 use motion::{ClPoint, Cutters, Move, MoveKind, Toolpath};

@@ -1,5 +1,7 @@
 //! Which moves belong to neighbouring tracks rather than to one.
 
+use std::collections::BTreeMap;
+
 use geometry::Point3;
 use motion::{Cutters, MoveKind, Toolpath};
 
@@ -20,7 +22,7 @@ pub(crate) struct Tracks<'a> {
     path: &'a Toolpath,
     /// Distance along the path to the end of each move, mm.
     along: Vec<f64>,
-    /// Length of each pass that ends where it began, mm.
+    /// Of each move, the length of its pass where that ends where it began, mm.
     closed: Vec<Option<f64>>,
     cutters: Cutters,
 }
@@ -28,7 +30,7 @@ pub(crate) struct Tracks<'a> {
 impl<'a> Tracks<'a> {
     pub fn new(path: &'a Toolpath, cutters: impl Into<Cutters>) -> Self {
         let mut along = Vec::with_capacity(path.len());
-        let (mut length, mut closed) = (0.0, vec![None; path.passes()]);
+        let (mut length, mut closed) = (0.0, BTreeMap::new());
         // Where the pass of the moves so far began to cut: the way to there, and the place.
         let mut begun: Option<(u32, f64, Point3)> = None;
         for (from, to, step) in path.segments() {
@@ -38,12 +40,17 @@ impl<'a> Tracks<'a> {
                     begun => begun.insert((step.pass, length, from)),
                 };
                 let round = length + (to - from).norm() - start;
-                closed[step.pass as usize] =
-                    ((place - to).norm() <= SAME_PLACE && round > 0.0).then_some(round);
+                if (place - to).norm() <= SAME_PLACE && round > 0.0 {
+                    closed.insert(step.pass, round);
+                } else {
+                    closed.remove(&step.pass);
+                }
             }
             length += (to - from).norm();
             along.push(length);
         }
+        // Numbers of passes may be any.
+        let closed = path.moves.iter().map(|step| closed.get(&step.pass).copied()).collect();
         Self { path, along, closed, cutters: cutters.into() }
     }
 
@@ -65,7 +72,7 @@ impl<'a> Tracks<'a> {
         let linked = x.kind == MoveKind::Link || y.kind == MoveKind::Link;
         let way = (self.along[a as usize] - self.along[b as usize]).abs();
         // The end of a closed pass goes on in its start.
-        let round = self.closed[x.pass as usize].filter(|_| x.pass == y.pass);
+        let round = self.closed[a as usize].filter(|_| x.pass == y.pass);
         // Moves of one pass are made by one cutter.
         let same_track = SAME_TRACK * self.cutters.of_move(a).radius();
         let far = round.map_or(way, |round| way.min((round - way).abs())) > same_track;

@@ -17,7 +17,7 @@ pub struct PathsInTurn {
 impl PathsInTurn {
     /// Begins with a path.
     pub fn new(path: Toolpath) -> Self {
-        Self { top: highest(&path), passes: path.passes() as u32, path }
+        Self { top: highest(&path), passes: passes(&path), path }
     }
 
     /// Adds a path, with rapids at a feed of `rapid_rate` mm/min; tells the index of its first move. The two rapids before
@@ -48,8 +48,9 @@ impl PathsInTurn {
         path.origin.strays = path.origin.strays.max(next.origin.strays);
         path.origin.standing_s += next.origin.standing_s;
         path.origin.leans = path.origin.leans.max(next.origin.leans);
-        self.passes += next.passes().max(1) as u32;
-        path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
+        self.passes = self.passes.saturating_add(passes(&next).max(1));
+        path.moves
+            .extend(next.moves.into_iter().map(|step| Move { pass: step.pass.saturating_add(pass), ..step }));
         path.origin.lines.extend(next.origin.lines);
         first + 2
     }
@@ -58,6 +59,11 @@ impl PathsInTurn {
     pub fn finish(self) -> Toolpath {
         self.path
     }
+}
+
+/// Passes of a path, as far as they can be counted.
+fn passes(path: &Toolpath) -> u32 {
+    u32::try_from(path.passes()).unwrap_or(u32::MAX)
 }
 
 /// The highest place of the tip.

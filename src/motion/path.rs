@@ -115,7 +115,8 @@ pub struct Toolpath {
 }
 
 impl Toolpath {
-    /// Moves that stand in no program yet.
+    /// Moves that stand in no program yet. They are taken as they are: [`Toolpath::check`] tells whether they can be cut, and
+    /// functions that cut or measure return its error.
     pub fn new(start: ClPoint, moves: Vec<Move>) -> Self {
         Self { start, moves, origin: Origin::default() }
     }

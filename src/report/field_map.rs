@@ -167,6 +167,7 @@ pub fn interval_picture(
         top: "interval",
         bottom: "narrow",
         extremes,
+        of: None,
     };
     let served = served(grid, &map, field);
     let colour = |value: f32| if value.is_nan() { OFF_PART } else { PAPER };

@@ -161,6 +161,8 @@ pub(super) struct Key {
     pub bottom: &'static str,
     /// Least and greatest value of all cells; those beyond the key wear the colours of its ends.
     pub extremes: Option<(f64, f64)>,
+    /// What the extremes are those of, where the report has greater ones.
+    pub of: Option<&'static str>,
 }
 
 impl Key {
@@ -176,7 +178,7 @@ impl Key {
         [top, bottom]: [&'static str; 2],
     ) -> Self {
         let (middle, ticks) = (0.5 * (from + to), labelled(from, to, TICKS, unit));
-        Self { from, middle, to, gradient: sequential, ticks, unit, top, bottom, extremes }
+        Self { from, middle, to, gradient: sequential, ticks, unit, top, bottom, extremes, of: None }
     }
 
     /// Where a value stands between the lower end (0) and the upper end (1).
@@ -234,6 +236,7 @@ fn deviation_key(limits: &Limits) -> Key {
         top: "excess",
         bottom: "gouge",
         extremes: None,
+        of: Some("at grid points:"),
     }
 }
 
@@ -249,6 +252,7 @@ pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> 
     finite.fold(None, |range, v| Some(range.map_or((v, v), |(a, b): (f64, f64)| (a.min(v), b.max(v)))))
 }
 
+/// Least and greatest of the finite values of cells.
 fn extremes_of_cells(values: &[f32]) -> Option<(f64, f64)> {
     extremes(values.iter().copied().map(f64::from))
 }
@@ -413,16 +417,12 @@ fn draw_key(page: &mut Picture, key: &Key, [x, top]: [i64; 2], map_height: usize
     let Some((least, greatest)) = key.extremes else { return };
     /// Lines below the key are this far apart, pixels.
     const LINE: i64 = 20;
-    for (line, (word, value)) in [("max", greatest), ("min", least)].into_iter().enumerate() {
-        let text = format!("{word} {} {}", unit.text(value, (key.to - key.from) / 1000.0), unit.name);
-        page.text(
-            x,
-            top + height + 8 + LINE * (line as i64 + 2),
-            &text,
-            TextSize::Small,
-            Align::Left,
-            FAINT_INK,
-        );
+    let ends = [("max", greatest), ("min", least)].map(|(word, value)| {
+        format!("{word} {} {}", unit.text(value, (key.to - key.from) / 1000.0), unit.name)
+    });
+    let lines = key.of.map(str::to_owned).into_iter().chain(ends);
+    for (line, text) in (2..).zip(lines) {
+        page.text(x, top + height + 8 + LINE * line, &text, TextSize::Small, Align::Left, FAINT_INK);
     }
 }
 

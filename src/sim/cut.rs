@@ -35,7 +35,8 @@ use super::form::{Family, Form};
 use super::sweep::{Ball, Flat, LocalMove, Rounded, Sweep};
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
-use super::{Grid, NOT_CUT, ZMap, cut_reference};
+use super::{CutError, Grid, NOT_CUT, ZMap};
+use crate::reference::reference;
 use crate::sweep;
 use choose::{Chooser, FEW, SQUARES, Square, ones};
 use cutter::Cutter;
@@ -77,12 +78,12 @@ const DEEPEST: f64 = 32.0;
 /// where the stored height stays that of the stock).
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so; the stock is lost then.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so; the stock is lost then.
 ///
 /// # Tolerance
 /// Heights lie within 1e-5 mm, or half a unit in the last place of f32 if that is more, of those of
 /// [`cut_reference`]. The bits depend neither on the number of threads nor on the machine's vector unit.
-pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, Cancelled> {
+pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, CutError> {
     cut_counted(stock, cutter, path, monitor).map(|(map, _)| map)
 }
 
@@ -95,15 +96,16 @@ pub fn cut_counted(
     cutter: &Cutter,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<(ZMap, Work), Cancelled> {
+) -> Result<(ZMap, Work), CutError> {
     check(monitor)?;
+    path.check_upright()?;
     let form = Form::new(cutter);
     // The place of a barrel on its track has no closed form here.
     if path.len() > Name::MOST || form.profile.centre_x < 0.0 {
-        return Ok((cut_reference(&stock, cutter, path, monitor)?, Work::default()));
+        return Ok((reference(&stock, cutter, path, monitor)?, Work::default()));
     }
     let side = tile_side(form.radius, stock.grid.cell);
-    UnorderedCut { form, path, side, bounded: true, margin: 0.0 }.run(stock, monitor)
+    UnorderedCut { form, path, side, bounded: true, margin: 0.0 }.run(stock, monitor).map_err(CutError::from)
 }
 
 /// As [`cut_counted`] without any bound: every move that reaches a tile is evaluated at each of its cells,
@@ -117,10 +119,11 @@ pub fn cut_all_candidates(
     cutter: &Cutter,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<(ZMap, Work), Cancelled> {
+) -> Result<(ZMap, Work), CutError> {
+    path.check_upright()?;
     let form = Form::new(cutter);
     let side = tile_side(form.radius, stock.grid.cell).min(CANDIDATES_TILE);
-    UnorderedCut { form, path, side, bounded: false, margin: 0.0 }.run(stock, monitor)
+    UnorderedCut { form, path, side, bounded: false, margin: 0.0 }.run(stock, monitor).map_err(CutError::from)
 }
 
 fn tile_side(radius: f64, cell: f64) -> usize {

@@ -3,6 +3,7 @@
 
 use super::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
 use super::{Grid, NOT_CUT, ZMap, cut, cut_reference};
+use crate::CutError;
 use cutter::Cutter;
 use geometry::{Point2, Point3};
 use motion::{MoveKind, Toolpath};
@@ -13,7 +14,7 @@ use work::monitor::{Cancelled, Monitor, Silent};
 /// An engine and what it promises.
 struct Engine {
     name: &'static str,
-    cut: fn(&ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, Cancelled>,
+    cut: fn(&ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, CutError>,
     /// How far heights may lie from the exact ones, mm; 0 for those that round only once, on storing.
     tolerance: f32,
 }
@@ -187,7 +188,12 @@ fn a_cancelled_cut_returns_nothing_and_progress_adds_up() {
             assert_eq!(announced, advanced, "{}", engine.name);
             for stop_at in [0, 1, 3, questions / 2, questions - 1] {
                 let listener = Listener::stopping_at(stop_at);
-                assert_eq!(run(&listener), Err(Cancelled), "{} at {stop_at}", engine.name);
+                assert_eq!(
+                    run(&listener),
+                    Err(CutError::Cancelled(Cancelled)),
+                    "{} at {stop_at}",
+                    engine.name
+                );
                 assert!(listener.advanced.into_inner() < announced);
             }
             assert!(run(&Listener::stopping_at(questions)).is_ok());

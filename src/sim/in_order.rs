@@ -30,7 +30,7 @@ use super::bins::MoveBins;
 use super::form::Form;
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
-use super::{Grid, NOT_CUT, ZMap};
+use super::{CutError, Grid, NOT_CUT, ZMap};
 use cutter::Cutter;
 use geometry::{Point2, Point3};
 use leaf::Tally;
@@ -119,7 +119,7 @@ impl Removal {
 /// says what each move removed. The stock that is left can be handed to the next cutter.
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
 /// Heights are those of [`cut_reference`](super::cut_reference) to one unit in the last place of f32
@@ -135,7 +135,7 @@ pub fn cut_in_order(
     cutter: &Cutter,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<Removal, Cancelled> {
+) -> Result<Removal, CutError> {
     cut_by_tiles(stock, cutter, path, monitor, SIDE, |job, cells, moves| {
         Tile::load(cells, job).cut(job, cells, moves)
     })
@@ -181,8 +181,9 @@ fn cut_by_tiles(
     monitor: &dyn Monitor,
     side: usize,
     cut: impl Fn(&OrderedCut, &mut TileCells, &[u32]) -> Result<TileRecord, Cancelled> + Sync + Send,
-) -> Result<Removal, Cancelled> {
+) -> Result<Removal, CutError> {
     check(monitor)?;
+    path.check_upright()?;
     let (grid, within) = (stock.grid, stock.within);
     let job = OrderedCut { cell: grid.cell, grid, within, form: Form::new(cutter), path, monitor };
     let bins = MoveBins::new(&stock.grid, side, job.form.radius, path);
@@ -198,7 +199,7 @@ fn cut_by_tiles(
             *found = cut(&job, cells, moves)?;
         }
         monitor.advance(1);
-        Ok(())
+        Ok::<(), Cancelled>(())
     })?;
     let found: Vec<TileRecord> = tiles.into_iter().map(|(_, found)| found).collect();
     let (moves, rapid_contacts) = join(found, &job, stock.grid.cell);

@@ -1,19 +1,19 @@
 //! Several cutters on one stock, one after the other: each begins with what those before it left.
 
 use super::in_order::{Removal, cut_in_order};
-use super::{NOT_CUT, ZMap};
+use super::{CutError, NOT_CUT, ZMap};
 use cutter::Cutter;
 use motion::{Cutters, Toolpath};
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::Monitor;
 
 /// How one cutter cuts heights along a path, as [`cut`](super::cut()) does.
-pub type CutHeights = fn(ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, Cancelled>;
+pub type CutHeights = fn(ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, CutError>;
 
 /// Cuts `stock` along every move of `path`, each by its own cutter. Moves are counted through the whole path; of equal cuts
 /// that of the first cutter counts.
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
 /// That of `cut`.
@@ -23,7 +23,7 @@ pub fn cut_in_turn(
     cutters: &Cutters,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<ZMap, Cancelled> {
+) -> Result<ZMap, CutError> {
     if !cutters.are_several() {
         return cut(stock, cutters.first(), path, monitor);
     }
@@ -39,13 +39,13 @@ pub fn cut_in_turn(
 /// As [`cut_in_order`], each move by its own cutter.
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
 pub fn cut_in_order_in_turn(
     stock: ZMap,
     cutters: &Cutters,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<Removal, Cancelled> {
+) -> Result<Removal, CutError> {
     let mut winners = vec![NOT_CUT; stock.grid.len()];
     let mut all = Removal { stock, moves: Vec::new(), rapid_contacts: Vec::new(), volume_bound: 0.0 };
     for stretch in cutters.stretches(path) {

@@ -3,7 +3,7 @@
 //! Enters: stock, a cutter or a solid tool, and moves. Leaves: the stock after the moves, the move that cut each place, and
 //! what each move removes. Lengths in mm, volumes in mm³, z up. This crate sees neither strategies nor the design part.
 //!
-//! Limits: engines on heights ([`cut`], [`cut_in_order`]) need an upright tool. Tilted tools are cut by [`VoxelEngine`] and
+//! Limits: engines on heights ([`cut`], [`cut_in_order`]) need an upright tool, and return an error for others. Tilted tools are cut by [`VoxelEngine`] and
 //! [`Rays`]. Results depend neither on the number of threads nor on the vector unit.
 
 mod bins;
@@ -13,6 +13,7 @@ mod engine_tests;
 mod envelope;
 mod form;
 mod grid;
+mod heights;
 
 mod in_order;
 mod in_stock;
@@ -35,6 +36,7 @@ pub use bins::MoveBins;
 pub use cut::{Work, cut, cut_all_candidates, cut_counted};
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
+pub use heights::CutError;
 
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
 pub use in_stock::{InStock, KeptOut, first_in_stock};

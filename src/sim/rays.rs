@@ -25,7 +25,7 @@ use super::solid::{Moving, OppositeAxes, SweptMoves, below};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
 use lowest::{Ray, Support};
-use motion::{Move, MoveKind, Toolpath};
+use motion::{Move, MoveKind, PathError, Toolpath};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -57,8 +57,11 @@ pub struct RayHit {
 }
 
 /// Why there are no rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RaysError {
+    /// A place of the path is no number, or an axis no unit vector.
+    #[error(transparent)]
+    Path(#[from] PathError),
     /// A move turns the axis to its opposite.
     #[error(transparent)]
     Opposite(#[from] OppositeAxes),
@@ -110,9 +113,10 @@ impl Rays {
     /// Of all moves of `path` but rapids.
     ///
     /// # Errors
-    /// [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
+    /// [`RaysError::Path`]; [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
     pub fn new(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
         check(monitor)?;
+        path.check()?;
         let moves = SweptMoves::new(solid, path, cuts)?;
         check(monitor)?;
         Ok(Self { moves })

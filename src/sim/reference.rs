@@ -16,7 +16,7 @@ use super::form::{Family, Form};
 use super::swept::{ball_height, flat_height, rounded_height_below};
 use super::tiles::{TileCells, tiles};
 use super::track::{Track, larger, smaller};
-use super::{NOT_CUT, ZMap};
+use super::{CutError, NOT_CUT, ZMap};
 use cutter::Cutter;
 use geometry::Point2;
 use motion::Toolpath;
@@ -45,13 +45,24 @@ const STOCK: f64 = -1.0;
 /// there).
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
 /// Moves are evaluated and compared in f64 (see [`SweptMove`](super::SweptMove)) at the cell
 /// centres; storing the height as f32 adds at most half a unit in its last place: 0.004 µm below 128
 /// mm, 0.03 µm below 1 m. The bits do not depend on the number of threads.
 pub fn cut_reference(
+    stock: &ZMap,
+    cutter: &Cutter,
+    path: &Toolpath,
+    monitor: &dyn Monitor,
+) -> Result<ZMap, CutError> {
+    path.check_upright()?;
+    Ok(reference(stock, cutter, path, monitor)?)
+}
+
+/// As [`cut_reference`], for a path that was checked.
+pub(crate) fn reference(
     stock: &ZMap,
     cutter: &Cutter,
     path: &Toolpath,

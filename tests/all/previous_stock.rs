@@ -88,6 +88,27 @@ fn toolpaths_in_turn_answer_for_what_they_leave_together() {
     assert_eq!((code, &report["best"]), (Some(0), &Value::from("finish")), "{report}");
 }
 
+/// Where no toolpath has a path the message has the reason of each.
+#[test]
+fn where_none_can_be_planned_each_says_why() {
+    let home = tempfile::tempdir().unwrap();
+    let contours =
+        |name: &str, rest: &str| format!("[[toolpath]]\nname = \"{name}\"\nstrategy = \"waterline\"\n{rest}");
+    let scene = [contours("first", ""), contours("second", PREVIOUS), contours("third", "")].concat();
+    std::fs::write(home.path().join("scene.toml"), format!("{PLATE}{scene}")).unwrap();
+    let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
+    let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("none of the 3 toolpaths could be planned"), "{words}");
+    for told in [
+        "\"first\":",
+        "\"second\": waterline cannot plan this part: the toolpath before it could not be planned",
+        "\"third\":",
+    ] {
+        assert!(words.contains(told), "{told}: {words}");
+    }
+}
+
 #[test]
 fn what_has_no_previous_stock_says_so() {
     let home = tempfile::tempdir().unwrap();

@@ -158,3 +158,49 @@ fn what_fairing_moved_is_told_as_a_distance_from_the_drawing() {
     let drawn = Blade::new(&sections, &settings(BladeSide::Around)).unwrap();
     assert!(drawn.sections.iter().all(|section| section.off_drawing().is_none()));
 }
+
+/// One point far off its neighbours stays off: fairing moves no point much farther than the noise of all. That is told with its place, also
+/// without fairing. Noise, and corners that all sections have, are not.
+#[test]
+fn a_point_off_its_neighbours_is_told() {
+    let step = crate::fairing::JUMP_REMOVING_STEP;
+    let methods = [
+        None,
+        Some(FairingMethod::Kjellander { step }),
+        Some(FairingMethod::ControlPoints),
+        Some(FairingMethod::Energy),
+        Some(FairingMethod::Published { neighbours: 1 }),
+    ];
+    let notes = |method: Option<FairingMethod>, change: &dyn Fn(usize, &mut Vec<Point2>)| {
+        let mut all = twisted().sections().to_vec();
+        for (k, section) in all.iter_mut().enumerate() {
+            let Outline::Closed(points) = &mut section.outline else { panic!() };
+            change(k, points);
+        }
+        let fairing = method.map(|method| (method, 0.02));
+        let settings = BladeSettings { fairing, ..settings(BladeSide::Around) };
+        Blade::new(&Sections::new(all).unwrap(), &settings).unwrap().notes()
+    };
+    let noise = |k: usize| 0.002 * ((k * k * 7919 % 1000) as f64 / 500.0 - 1.0);
+    for method in methods {
+        let faired = usize::from(method.is_some());
+        assert_eq!(notes(method, &|_, _| ()).len(), faired, "{method:?}");
+        let noisy = |_: usize, points: &mut Vec<Point2>| {
+            points.iter_mut().enumerate().for_each(|(k, p)| p.y += noise(k));
+        };
+        assert_eq!(notes(method, &noisy).len(), faired, "{method:?}");
+        let corners = |_: usize, points: &mut Vec<Point2>| points[30].y += 0.3;
+        assert_eq!(notes(method, &corners).len(), faired, "{method:?}");
+        let one = |section: usize, points: &mut Vec<Point2>| {
+            if section == 3 {
+                points[30].y += 0.3;
+            }
+        };
+        let words = notes(method, &one);
+        let height = 40.0 * 3.0 / 7.0;
+        assert_eq!(words.len(), faired + 1, "{method:?}: {words:?}");
+        let said = &words[faired];
+        assert!(said.contains(&format!("outline at height {height} lies")), "{said}");
+        assert_eq!(said.contains("fairing moved it"), method.is_some(), "{said}");
+    }
+}

@@ -29,7 +29,7 @@ mod relaxation;
 mod tests;
 
 pub use kjellander::JUMP_REMOVING_STEP;
-pub use noise::noise;
+pub use noise::{noise, outlier};
 
 use geometry::{CubicSpline, KnotError, SplineError, Vector2};
 use relaxation::{Relaxation, State, Unknown};

@@ -1,5 +1,7 @@
 //! Walls and engagement of a pocket.
 
+use std::collections::BTreeMap;
+
 use metrology::{EngagementFigures, ExceedingStretch, PocketFigures, StockBefore, View};
 use motion::{MoveKind, Toolpath};
 use report::{Claim, Figure, FigureTable, Gravity, WALL, micrometres, with_bound};
@@ -233,14 +235,15 @@ fn steepest(
     stands: &dyn Fn(usize) -> bool,
 ) -> (f64, f64, Option<usize>) {
     let levels = levels(path);
-    let mut floors = vec![f64::INFINITY; path.passes()];
+    let mut floors: BTreeMap<u32, f64> = BTreeMap::new();
     // A helix may be all that a pass is.
     for m in path.moves.iter().filter(|m| matches!(m.kind, MoveKind::Cut | MoveKind::Plunge)) {
-        let floor = &mut floors[m.pass as usize];
+        let floor = floors.entry(m.pass).or_insert(f64::INFINITY);
         *floor = floor.min(m.to.tip.z);
     }
     let cleared = |pass: u32| {
-        let above = |level: &f64| *level > floors[pass as usize] + ROUNDING;
+        let floor = floors.get(&pass).copied().unwrap_or(f64::INFINITY);
+        let above = |level: &f64| *level > floor + ROUNDING;
         levels.iter().rev().copied().find(above).unwrap_or(top).min(top)
     };
     let mut found = (0.0, 0.0, None);

@@ -36,7 +36,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
-            let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
+            let removed =
+                cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor).map_err(run.heights())?;
             let mut figures = removal_figures(run.path(), &removed, &cut.height, run.session.top());
             if figures.rapid_contacts.is_empty() {
                 let rapid =
@@ -97,7 +98,7 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
     let mut stock = cut.uncut(cut.grid, run.session.top(), monitor)?.within(&run.session.area());
     for (cutter, path) in run.before() {
-        stock = sim::cut(stock, &cutter, &path, monitor)?;
+        stock = sim::cut(stock, &cutter, &path, monitor).map_err(run.heights())?;
         stock.cut_by.fill(sim::NOT_CUT);
     }
     Ok(stock)

@@ -7,8 +7,9 @@ use work::monitor::Monitor;
 
 use super::normals::RAYS;
 use super::{Engine, EngineError, Measured, Task, View};
+use crate::measure::measure_with_walls;
 use crate::ridge_map::{places_above, ridge_map};
-use crate::{Asked, RidgeMap, RidgePlace, measure_with_walls};
+use crate::{Asked, RidgeMap, RidgePlace};
 
 /// An engine on cells.
 pub(super) struct Cells {

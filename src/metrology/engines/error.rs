@@ -1,6 +1,7 @@
 //! Why an engine could not cut or measure.
 
-use sim::{GridError, OppositeAxes, RaysError, VoxelError};
+use motion::PathError;
+use sim::{CutError, GridError, OppositeAxes, RaysError, VoxelError};
 use work::monitor::Cancelled;
 
 /// Why an engine could not cut or measure.
@@ -9,6 +10,9 @@ pub enum EngineError {
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// The path cannot be cut by the engine.
+    #[error(transparent)]
+    Path(PathError),
     /// The grid does not fit.
     #[error(transparent)]
     Grid(#[from] GridError),
@@ -40,11 +44,21 @@ pub enum EngineError {
     },
 }
 
+impl From<CutError> for EngineError {
+    fn from(error: CutError) -> Self {
+        match error {
+            CutError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            CutError::Path(path) => Self::Path(path),
+        }
+    }
+}
+
 impl From<RaysError> for EngineError {
     fn from(error: RaysError) -> Self {
         match error {
             RaysError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             RaysError::Opposite(axes) => Self::Turn(axes),
+            RaysError::Path(path) => Self::Path(path),
         }
     }
 }
@@ -53,6 +67,7 @@ impl From<VoxelError> for EngineError {
     fn from(error: VoxelError) -> Self {
         match error {
             VoxelError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            VoxelError::Moves(path) => Self::Path(path),
             other => Self::Voxels(other),
         }
     }

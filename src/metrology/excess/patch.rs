@@ -359,8 +359,10 @@ impl Patches<'_> {
         if here.distance > self.least {
             // Short moves between cells may have cut away what seems to stand so high.
             let beside = self.beside(&(point + normal * here.distance), &hidden);
-            hidden = Cow::Owned(hidden.iter().copied().chain(beside).collect());
-            here = surface.along_normal_below(stock, point, normal, &hidden)?;
+            if !beside.is_empty() {
+                hidden = Cow::Owned(hidden.iter().copied().chain(beside).collect());
+                here = surface.along_normal_below(stock, point, normal, &hidden)?;
+            }
         }
         // And so may others on the way to where the line comes out.
         for _ in 0..if all { MOST_ON_THE_WAY } else { 0 } {

@@ -73,7 +73,7 @@ impl<'a> Calculator<'a> {
     }
 
     /// The height of the ridge in the section across both tracks through the place of the design below a crossing: where the
-    /// balls of both tracks come as near as their radius. `None` where they do not meet, where they meet in
+    /// balls of both tracks come as near as their radius. `None` where they do not meet, where the ridge runs across that section, where they meet in
     /// another ridge than was crossed, or a move meets that is not of a pass: a link, a plunge, a lift.
     pub fn at(&self, crossing: &RidgeCrossing) -> Option<Calculated> {
         if crossing.moves.iter().any(|k| self.path.moves[*k as usize].kind != MoveKind::Cut) {
@@ -103,6 +103,11 @@ impl<'a> Calculator<'a> {
             at += across * x + up * y;
             let unsettled = x.hypot(y);
             if unsettled < SETTLED {
+                // Tracks that cross meet in ridges along both of their bisectors. A section sees that alone which it is across.
+                let ridge = (at - balls[0].centre).cross(&(at - balls[1].centre));
+                if ridge.dot(&feed).abs() <= ridge.dot(&across).abs() {
+                    return None;
+                }
                 // Balls that all but stand in one place meet in a ridge that ends elsewhere.
                 let apart = (balls[1].centre - balls[0].centre).norm();
                 if (at - crossing.at).norm() > apart {

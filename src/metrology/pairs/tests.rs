@@ -109,6 +109,27 @@ fn passes_that_spread_are_not_parallel() {
     assert!(figures.pairs.iter().all(|pair| pair.greatest_difference_mm.unwrap() < 1e-6), "{figures:#?}");
 }
 
+/// Passes that cross others, squarely or not: what is calculated there is the ridge that stands there.
+#[test]
+fn where_passes_cross_the_ridge_is_that_of_the_place() {
+    let part = part(AnalyticShape::Plane { height: 0.0 });
+    for askew in [0.0, 0.05, 0.4, 1.0] {
+        let coarse =
+            (-1..=1).map(|k| 1.5 * f64::from(k)).map(|y| [Vector2::new(-3.0, y), Vector2::new(3.0, y)]);
+        let across = (-4..=4).map(|k| 0.35 * f64::from(k));
+        let across =
+            across.map(|x| [Vector2::new(x - 1.5 * askew, -3.0), Vector2::new(x + 1.5 * askew, 3.0)]);
+        let path = path(&part, &coarse.chain(across).collect::<Vec<_>>());
+        let figures = measured(&part, &Cutter::ball(6.0).unwrap(), &path).pairs;
+        assert!(figures.pairs.iter().any(|pair| pair.passes[0] < 3 && pair.calculated_places > 0), "{askew}");
+        for pair in &figures.pairs {
+            let difference = pair.greatest_difference_mm.unwrap_or(0.0);
+            assert!(difference < 1e-3, "{askew}: {pair:#?}");
+        }
+        assert!((figures.calculated_over_measured.unwrap() - 1.0).abs() < 1e-3, "{askew}: {figures:#?}");
+    }
+}
+
 #[test]
 fn other_cutters_have_measured_heights_alone() {
     let part = part(cylinder(false));

@@ -1,7 +1,8 @@
 //! Walls of a block against closed forms.
 
 use super::*;
-use crate::{Asked, Judged, Measurement, measure_with_walls};
+use crate::measure::measure_with_walls;
+use crate::{Asked, Judged, Measurement};
 use cutter::Cutter;
 use geometry::TriangleMesh;
 use sim::scenes::path_through;

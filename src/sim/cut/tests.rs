@@ -2,6 +2,7 @@
 //! tested in `engine_tests`.
 
 use super::*;
+use crate::cut_reference;
 use crate::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
 use geometry::{Point2, Point3};
 use work::monitor::Silent;

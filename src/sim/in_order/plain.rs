@@ -3,24 +3,24 @@
 
 use super::leaf::Tally;
 use super::{OrderedCut, Removal, TileCells, TileRecord, cut_by_tiles};
-use crate::ZMap;
 use crate::swept::swept_height;
+use crate::{CutError, ZMap};
 use cutter::Cutter;
 use motion::Toolpath;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::Monitor;
 
 /// As [`cut_in_order`](super::cut_in_order), by a plain loop over cells and without
 /// [`Removal::rapid_contacts`].
 ///
 /// # Errors
-/// [`Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
 #[doc(hidden)]
 pub fn cut_in_order_plain(
     stock: ZMap,
     cutter: &Cutter,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<Removal, Cancelled> {
+) -> Result<Removal, CutError> {
     cut_by_tiles(stock, cutter, path, monitor, super::SIDE, |job, cells, moves| Ok(cut(job, cells, moves)))
 }
 

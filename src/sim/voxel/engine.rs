@@ -36,11 +36,12 @@ impl<'a> VoxelEngine<'a> {
     /// Prepares the moves of `path`, coordinates up to [`MAX_COORDINATE`](geometry::MAX_COORDINATE).
     ///
     /// # Errors
-    /// [`VoxelError::Stock`], [`VoxelError::Axes`].
+    /// [`VoxelError::Stock`], [`VoxelError::Moves`], [`VoxelError::Axes`].
     pub fn new(stock: &'a Stock, solid: &Solid, path: &Toolpath) -> Result<Self, VoxelError> {
         if !stock.is_valid() {
             return Err(VoxelError::Stock);
         }
+        path.check()?;
         let rapids = path.moves.iter().map(|m| m.kind == MoveKind::Rapid).collect();
         Ok(Self { stock, parts: MotionParts::new(solid, path)?, rapids })
     }

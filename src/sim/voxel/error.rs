@@ -1,6 +1,7 @@
 //! Why voxels could not be cut.
 
 use crate::solid::OppositeAxes;
+use motion::PathError;
 use work::monitor::Cancelled;
 
 /// Why voxels could not be cut.
@@ -35,6 +36,9 @@ pub enum VoxelError {
         /// What they may take.
         allowed_mib: u64,
     },
+    /// A place of the path is no number, or an axis no unit vector.
+    #[error(transparent)]
+    Moves(#[from] PathError),
     /// Nobody can tell which way a tool axis turns.
     #[error(transparent)]
     Axes(#[from] OppositeAxes),
