@@ -92,12 +92,12 @@ impl Run<'_> {
         tool.map_or_else(String::new, |tool| format!(", tool {tool}"))
     }
 
-    /// For voxels that do not fit.
+    /// For paths that cannot be cut of heights.
     pub fn heights(&self) -> impl Fn(sim::CutError) -> JobError {
         |reason| JobError::engine(self.scene(), &self.request.name, reason.into())
     }
 
-    /// The same where voxels are cut.
+    /// For voxels that do not fit.
     pub fn voxels(&self) -> impl Fn(sim::VoxelError) -> JobError {
         |reason| JobError::engine(self.scene(), &self.request.name, reason.into())
     }

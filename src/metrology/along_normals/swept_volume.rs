@@ -313,8 +313,7 @@ impl AlongNormal for SweptVolume<'_> {
                 let looked = [2.0 * thin.radius, depth];
                 let cut = self.on_ridge(point, normals, looked, found);
                 let corner = corner_at(self.part, point, &normals, normal, -cut.deviation);
-                let of_corner =
-                    corner.map(|normals| self.on_ridge(point, normals, looked, found));
+                let of_corner = corner.map(|normals| self.on_ridge(point, normals, looked, found));
                 of_corner.into_iter().chain([cut]).max_by(|a, b| a.deviation.total_cmp(&b.deviation))
             }
             // What the far side of a thin part has lost is no loss of this one.
