@@ -7,7 +7,29 @@ const DIAMETER: [&str; 3] = ["D=", "DIA=", "DIAMETER="];
 const CORNER: [&str; 2] = ["CR=", "R="];
 
 /// Tools that leave another surface than an end mill of their diameter.
-const OTHER_KINDS: [&str; 7] = ["drill", "tap", "thread", "reamer", "chamfer", "spot", "taper"];
+const OTHER_KINDS: [&str; 21] = [
+    "drill",
+    "tap",
+    "thread",
+    "reamer",
+    "chamfer",
+    "spot",
+    "taper",
+    "lollipop",
+    "dovetail",
+    "t-slot",
+    "tslot",
+    "slot mill",
+    "form mill",
+    "radius mill",
+    "barrel",
+    "boring",
+    "engrav",
+    "countersink",
+    "counter sink",
+    "counterbore",
+    "counter bore",
+];
 
 /// Words by which a comment speaks of a cutter that is not in use.
 const NOT_IN_USE: [&str; 7] = ["NOT", "OLD", "WAS", "INSTEAD", "FORMER", "FORMERLY", "WRONG"];
@@ -395,7 +417,15 @@ mod tests {
         ] {
             assert!(matches!(cutter_of_remark(text, Some(1.0)), Said::Unclear(_)), "{text}");
         }
-        for text in ["T1 D=1/4 - drill", "T1 end mill", "ZMIN=-3"] {
+        for text in [
+            "T1 D=1/4 - drill",
+            "T1 end mill",
+            "ZMIN=-3",
+            "T5 D=6. CR=3. - lollipop mill",
+            "T6 D=12. CR=0. - Dovetail mill",
+            "T7 D=20 CR=0.5 - slot mill",
+            "T8 D=8 CR=2 - radius mill",
+        ] {
             assert_eq!(cutter_of_remark(text, Some(1.0)), Said::Nothing, "{text}");
         }
         let rounded = cutter_of_remark("T1 D=.0625 CR=.0313 - ball end mill", Some(INCH));
