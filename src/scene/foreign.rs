@@ -73,7 +73,9 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             read => read,
         }
     };
-    let read = read.map_err(refused)?.from_above();
+    let read = read.map_err(refused)?;
+    // Where the machine is known, so are its axes' limits: no assumed place may leave them.
+    let read = if scene.five_axis.is_none() { read.from_above() } else { read };
     let kinematics = scene.five_axis.as_ref().map(|machine| &machine.kinematics);
     // Locations by APT are of the tip, whatever its length.
     let length = |tool: u32| lengths.get(&tool).copied().filter(|_| !is_apt);

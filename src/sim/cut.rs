@@ -1,7 +1,7 @@
 //! The z-map engine: the lower envelope of all swept moves by branch and bound. mm, z up.
 //!
 //! Enters: stock, cutter, path. Leaves: the stock after the whole path, as exact as that of
-//! [`cut_reference`](super::cut_reference) to 0.01 µm, in a small share of its time.
+//! [`cut_reference`](crate::cut_reference)(super::cut_reference) to 0.01 µm, in a small share of its time.
 //!
 //! Tiles of the grid, one worker each, hold the moves that can reach them and are divided like a
 //! quadtree, down to leaves of 8 × 8 cells. At every square moves are dropped that cannot be lowest
@@ -22,7 +22,7 @@
 //!
 //! Heights in a leaf are f32 in coordinates of the tile. Where their rounding matters (walls, rims, steep tracks, unsettled
 //! places on a torus) the leaf is worked out again in f64. Deep tiles and large cutters are cut in f64 throughout.
-//! Barrels, whose place on the track has no closed form, go through [`cut_reference`](super::cut_reference).
+//! Barrels, whose place on the track has no closed form, go through [`cut_reference`](crate::cut_reference)(super::cut_reference).
 
 mod choose;
 mod leaf;
@@ -82,7 +82,7 @@ const DEEPEST: f64 = 32.0;
 ///
 /// # Tolerance
 /// Heights lie within 1e-5 mm, or half a unit in the last place of f32 if that is more, of those of
-/// [`cut_reference`]. The bits depend neither on the number of threads nor on the machine's vector unit.
+/// [`cut_reference`](crate::cut_reference). The bits depend neither on the number of threads nor on the machine's vector unit.
 pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, CutError> {
     cut_counted(stock, cutter, path, monitor).map(|(map, _)| map)
 }
