@@ -854,6 +854,21 @@ fn stock_of_a_mesh_is_measured_as_the_same_block() {
     assert!(answer.stderr.contains("4.000 mm out of its stock at x 16.000"), "{}", answer.stderr);
 }
 
+/// The start is where the machine is at home: no place higher than its travel is assumed for a program that goes there first.
+#[test]
+fn a_program_from_the_top_of_a_machine_keeps_within_its_travel() {
+    let home = tempfile::tempdir().unwrap();
+    let machine = "[machine.kinematics]\npreset = \"ac-table\"\npost = \"full\"\ngauge_length = 120\n\
+                   workpiece_zero = [50, 40, -300]\nz = [-500, 0]\n";
+    std::fs::write(home.path().join("mill.toml"), machine).unwrap();
+    let mut program = raster();
+    (program[3], program[6], program[7]) = ("G53 G0 Z0".into(), "A0 C0".into(), "G0 X0 Y0".into());
+    program.insert(8, "Z10".into());
+    let (answer, report) = verify_in(home.path(), &program, &["--machine", "mill.toml"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    assert!(violations(&report.unwrap()).is_empty());
+}
+
 #[test]
 fn rotary_words_go_through_the_machine_that_is_named() {
     let mut leaning = raster();
