@@ -370,7 +370,7 @@ impl Inspection<'_> {
         }
         let (point, normal) = design(share);
         // What lies under something else is not seen from above.
-        let seen = point + piece.inward * self.limits.gouge;
+        let seen = point + inward(share, self.limits.gouge);
         let top = self.part.highest_at(seen.x, seen.y)?;
         if (top.point - point).dot(&normal) > self.limits.gouge / normal.z.max(LEAST_FACING) {
             return None;
@@ -405,7 +405,7 @@ fn deeper(a: BorderCut, b: BorderCut) -> BorderCut {
 mod tests {
     use super::*;
     use crate::flat_scene::{LIMITS, gouge_of, plane};
-    use geometry::{NurbsSurface, TriangleMesh};
+    use geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, TriangleMesh};
     use part::{Part, Patch};
 
     fn gouge(cutter: &Cutter, plunge: Point3, cell: f64) -> GougeFigures {
@@ -469,6 +469,30 @@ mod tests {
         };
         let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[vec![tip(-6.0), tip(14.0)]], 0.1);
         assert!((found.max_depth_mm - deep).abs() < 1e-6, "{found:?}");
+    }
+
+    /// A ball that plunges beyond a corner of a bowl: it is cut deepest in the corner itself, from which the ground falls both ways.
+    #[test]
+    fn what_is_cut_of_the_corner_of_a_bowl_is_found() {
+        let shape = AnalyticShape::Sphere { height: 0.0, radius: 20.616, concave: true };
+        let bowl = AnalyticSurface::new(shape, [[-5.602, -2.495], [0.118, 6.326]]).unwrap();
+        let bowl = vec![Patch::Analytic(bowl)];
+        let tolerance = part::default_tessellation_tolerance(&bowl);
+        let part = Part::from_patches(bowl, tolerance).unwrap();
+        let (radius, centre) = (2.0, Point3::new(0.0, 0.0, 20.616));
+        let corner = part.highest_at(-2.495, 0.118).unwrap().point;
+        let normal = (centre - corner).normalize();
+        let ball = corner + normal * (radius - 0.02) + Vector3::new(0.1, -0.1, 0.0);
+        let along = (ball - corner).dot(&normal);
+        let truth = (along * along - (ball - corner).norm_squared() + radius * radius).sqrt() - along;
+        let tip = ball - Vector3::z() * radius;
+        let plunge = vec![tip + Vector3::z() * 9.0, tip];
+        for cell in [0.05, 0.2, 0.4] {
+            let cutter = Cutter::ball(2.0 * radius).unwrap();
+            let found = gouge_of(&part, &cutter, std::slice::from_ref(&plunge), cell);
+            let off = (found.max_depth_mm - truth).abs();
+            assert!(off <= found.error_bound_mm && off < 1e-4, "{cell}: {truth} {found:?}");
+        }
     }
 
     /// A level patch whose border is an arc in the plan. The triangles end at its chords; a ball that plunges beyond cuts the arc.
