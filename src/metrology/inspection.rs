@@ -414,7 +414,7 @@ impl Inspection<'_> {
 
     /// The same with further moves that may be lowest between centres.
     fn depth_with(&self, q: Point2, further: &[u32]) -> Option<(f64, Point3, u32)> {
-        let design = self.design_at(q).filter(|design| design.normal.z >= self.steepest)?;
+        let design = self.design_at(q)?;
         let (d, _) = self.along_normal_with(&design.point, &design.normal, further)?;
         Some((-d.distance, design.point, d.by))
     }
@@ -442,8 +442,9 @@ impl Inspection<'_> {
             let mut deepest: Option<(f64, Point3, u32)> = None;
             for dip in &mut left {
                 monitor::check(monitor)?;
-                // A ridge, or a wall, may be cut less deep than the cutter stands in it.
-                let found = self.depth_with(dip.at, &[dip.by]);
+                // A ridge, or a wall, may be cut less deep than the cutter stands in it. What is steep is measured elsewhere.
+                let is_own = self.design_at(dip.at).is_some_and(|design| design.normal.z >= self.steepest);
+                let found = self.depth_with(dip.at, &[dip.by]).filter(|_| is_own);
                 let depth = found.map_or(f64::NEG_INFINITY, |(depth, ..)| depth);
                 (dip.depth, dip.possible) = (depth, depth + (dip.possible - dip.depth).max(0.0));
                 deepest = deepest.into_iter().chain(found).max_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,7 +1,7 @@
-//! Dips so narrow that no cell centre lies in them: where the cutter itself stands in the design.
+//! Dips that no cell centre shows, because they are narrow or another move cut there: where the cutter itself stands in the design.
 //!
-//! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep such a dip may be at most, and,
-//! where that is too much, the places of moves that stand deeper in the design than what the cells saw. mm.
+//! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep a dip between centres may be at most, and the places
+//! of moves that stand deeper in the design than what the cells saw. mm.
 
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
