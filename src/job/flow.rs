@@ -3,21 +3,19 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
-use cutter::Cutter;
-use geometry::{Point3, Vector3};
 use io::digest;
-use metrology::{Engine, GougeRegion, Measured};
+use metrology::{Engine, Measured};
 use motion::Toolpath;
 use report::{
     Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
     Verdict,
 };
 use scene::ToolpathRequest;
-use sim::{NOT_CUT, Stock};
 use work::monitor::{self, Monitor};
 
 use super::correction::Looked;
 use super::earlier::{EarlierPath, WholePath};
+use super::gouge_moves::{self, OwnMoves};
 use super::measuring::Closeness;
 use super::planned::Planned;
 use super::run::Run;
@@ -128,24 +126,9 @@ impl Session {
         monitor: &dyn Monitor,
     ) -> Result<Outcome, JobError> {
         monitor::check(monitor)?;
-        let scene = &self.scene;
         let engine = self.engine(request)?;
-        let (cutters, holders) = self.tools(request);
-        if !matches!(self.stock, Stock::Box(_) | Stock::Milled { .. }) {
-            self.seen_from_above(
-                request,
-                engine,
-                "measured in a block: write `corners` in [stock], or nothing",
-            )?;
-        }
-        if cutters.are_several() {
-            let one = "measured with one tool at a time: write `tool = 2` (verify: --tool 2) for tool 2";
-            self.on_cells(request, engine, one)?;
-        }
-        if !earlier.is_empty() {
-            self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;
-        }
-        let tool = Tool::of(scene);
+        self.refuse_unmeasured(request, earlier, engine)?;
+        let tool = Tool::of(&self.scene);
         let fixtures = self.fixtures(monitor)?;
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
@@ -166,24 +149,13 @@ impl Session {
                 (&at_time, planned, measured, covered)
             }
         };
-        let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
+        let (cutters, holders) = self.tools(request);
+        let path = &planned.plan.path;
+        let whole = WholePath::new(earlier, path, cutters, self.scene.machine.rapid_rate);
         // The programs are as far off the moves that were measured.
         let strays = whole.path.origin.strays;
         measured.measurement.widen(strays);
-        // Where stock itself lies below the part between the cells no move cut.
-        let cut = |region: &&mut GougeRegion| region.move_index != NOT_CUT;
-        for region in measured.measurement.gouge.regions.iter_mut().filter(cut) {
-            let at = region.at_mm.into();
-            let (toolpath, move_index) = whole.own_move(region.move_index);
-            let its = earlier.get(toolpath);
-            let (path, cutters) =
-                its.map_or((&planned.plan.path, cutters), |before| (&before.path, &before.cutters));
-            region.move_index = move_index;
-            region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
-            region.tool = path.named_tool_of(move_index as usize);
-            region.toolpath = its.map(|before| before.name.clone());
-        }
-        let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
+        let tools = ToolMoves::of(cutters, holders, path);
         let mut covered = match (covered, &self.pocket) {
             (Some(known), _) => known,
             (None, Some(pocket)) => self.pocket_covered(pocket, cutters),
@@ -196,6 +168,12 @@ impl Session {
         if let Some(unseen) = &mut covered.unseen {
             unseen.measurement.widen(strays);
         }
+        gouge_moves::name(
+            &mut measured.measurement.gouge.regions,
+            &whole,
+            earlier,
+            OwnMoves { path, cutters },
+        );
         let run = Run {
             session: self,
             request,
@@ -210,34 +188,9 @@ impl Session {
         };
         let found = figures::all(&run, monitor)?;
         let machined = Machined::new(&run);
-        let simulation = SimulationFigures {
-            engine: engine.word(),
-            cell_mm: measured.cell,
-            cells: measured.cells,
-            error_bound_asked_mm: scene.simulation.error_bound,
-            refined_rectangles: measured.refined_rectangles,
-            finest_cell_mm: measured.finest_cell,
-            moves: planned.plan.path.len(),
-            wall_s: measured.wall_s,
-            threads: work::parallel::threads(),
-        };
-        let mut claims = judge::judge(
-            &measured.measurement,
-            &scene.tolerance,
-            &scene.scallop_rule,
-            found.claims,
-            planned.plan.path.program_name(),
-        );
-        judge::name_strays(&mut claims, planned.plan.path.origin.strays);
-        let [claims, left] = if self.goes_on(request) {
-            figures::before_others(claims)
-        } else if request.foreign().is_some_and(|read| read.others) {
-            [figures::with_other_tools(claims), Vec::new()]
-        } else {
-            [claims, Vec::new()]
-        };
+        let [claims, left] = self.claims(&run, found.claims);
         let measurement = &measured.measurement;
-        let unseen = covered.unseen.as_ref();
+        let unseen = covered.unseen.as_ref().map(|unseen| &unseen.measurement);
         let result = ToolpathResult {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),
@@ -246,18 +199,15 @@ impl Session {
             verdict: judge::verdict_by(&claims),
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
-            path: planned.path_figures(scene, monitor)?,
+            path: planned.path_figures(&self.scene, monitor)?,
             scallop: measurement.scallop.clone(),
-            gouge: unseen.map_or_else(
-                || measurement.gouge.clone(),
-                |unseen| measurement.gouge.or(&unseen.measurement.gouge),
-            ),
+            gouge: unseen
+                .map_or_else(|| measurement.gouge.clone(), |unseen| measurement.gouge.or(&unseen.gouge)),
             uncut: measurement.uncut.clone(),
-            excess: unseen
-                .map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.measurement.excess)),
+            excess: unseen.map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.excess)),
             deviation: measurement.deviation,
             figures: found.figures,
-            simulation,
+            simulation: self.simulation_figures(engine, &measured, path),
             surface_mesh: machined.figures(),
         };
         let Planned { plan, joints, rise_to, .. } = planned;
@@ -277,61 +227,46 @@ impl Session {
         })
     }
 
+    /// What the verdict is made of, and what the toolpath leaves to those behind it.
+    fn claims(&self, run: &Run<'_>, of_figures: Vec<Claim>) -> [Vec<Claim>; 2] {
+        let (scene, path) = (&self.scene, run.path());
+        let measurement = &run.measured.measurement;
+        let (limits, rule) = (&scene.tolerance, &scene.scallop_rule);
+        let mut claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
+        judge::name_strays(&mut claims, path.origin.strays);
+        if self.goes_on(run.request) {
+            figures::before_others(claims)
+        } else if run.request.foreign().is_some_and(|read| read.others) {
+            [figures::with_other_tools(claims), Vec::new()]
+        } else {
+            [claims, Vec::new()]
+        }
+    }
+
+    fn simulation_figures(
+        &self,
+        engine: &dyn Engine,
+        measured: &Measured,
+        path: &Toolpath,
+    ) -> SimulationFigures {
+        SimulationFigures {
+            engine: engine.word(),
+            cell_mm: measured.cell,
+            cells: measured.cells,
+            error_bound_asked_mm: self.scene.simulation.error_bound,
+            refined_rectangles: measured.refined_rectangles,
+            finest_cell_mm: measured.finest_cell,
+            moves: path.moves.len(),
+            wall_s: measured.wall_s,
+            threads: work::parallel::threads(),
+        }
+    }
+
     /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
     fn notes_on(&self, planned: &Planned, measured: &Measured, figures: Vec<String>) -> Vec<String> {
         let first = self.notes.iter().chain(&measured.note).chain(&measured.measurement.refined.note);
         first.chain(&planned.plan.notes).cloned().chain(figures).collect()
     }
-
-    /// Refuses what is not measured on cells under upright tools; `otherwise` is how it is.
-    fn on_cells(
-        &self,
-        request: &ToolpathRequest,
-        engine: &dyn Engine,
-        otherwise: &str,
-    ) -> Result<(), JobError> {
-        self.seen_from_above(request, engine, otherwise)?;
-        if self.scene.simulation.voxel.is_none() {
-            return Ok(());
-        }
-        let what = "the solid of `voxel` in [simulation] is";
-        Err(self.not_applicable(request, format!("{what} {otherwise}")))
-    }
-
-    /// Refuses what is not measured as heights; `otherwise` is how it is.
-    fn seen_from_above(
-        &self,
-        request: &ToolpathRequest,
-        engine: &dyn Engine,
-        otherwise: &str,
-    ) -> Result<(), JobError> {
-        let what = match () {
-            () if request.tilts() => "what tools that lean leave is".to_owned(),
-            () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
-            () if engine.tilts() => format!("with the engine `{}` a toolpath is", engine.word()),
-            () => return Ok(()),
-        };
-        Err(self.not_applicable(request, format!("{what} {otherwise}")))
-    }
-}
-
-/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line before where the
-/// move begins there.
-fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
-    /// Places along the move; a start that is lowest by less than a share of it counts as its end.
-    const PLACES: u32 = 64;
-    let line = |k: usize| path.line_of(k).unwrap_or_default();
-    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return line(step) };
-    let (from, to) = (path.location_before(step), this.to);
-    if from.axis != Vector3::z() || to.axis != from.axis {
-        return line(step);
-    }
-    let height = |k: u32| {
-        let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
-        cutter.height((tip.x - at.x).hypot(tip.y - at.y)).map_or(f64::INFINITY, |above| tip.z + above)
-    };
-    let begins = (1..=PLACES).all(|k| height(k) >= height(0));
-    line(if begins { before } else { step })
 }
 
 /// Says by which toolpath that is judged which another leaves beyond the limits.

@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::route::{Entry, Run, begun_near};
 use super::walls::Room;
-use geometry::{Piece, Point2, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 
 /// Radii of the arcs over the cutter's, the first that has room is taken.
 const RADII: [f64; 4] = [0.6, 0.4, 0.25, 0.12];
@@ -21,8 +21,25 @@ const SIDES: usize = 24;
 /// The pass ends at most this far beyond its beginning, over the radius, so that no mark stays between its arcs.
 const OVERLAP: f64 = 0.05;
 
+/// The runs along all walls of the centre's region, by piece, beside what `rough` passes have cleared.
+pub(super) fn along_walls<'p>(region: &'p Region, rough: &Region, radius: f64) -> Vec<(&'p Piece, Vec<Run>)> {
+    let of_piece = |piece: &'p Piece| {
+        let room = Room::new(piece);
+        let around = |wall: &[Point2]| {
+            // What is cleared beside this wall.
+            let beside = rough.pieces.iter().min_by(|a, b| {
+                let away = |piece: &Piece| SegmentGrid::of_curves(piece.curves()).distance(&wall[0]);
+                away(a).total_cmp(&away(b))
+            });
+            around(wall, &room, beside, radius)
+        };
+        (piece, piece.curves().map(around).collect())
+    };
+    region.pieces.iter().map(of_piece).collect()
+}
+
 /// The run of the last pass along `wall`. `rough` is the piece that the passes before have cleared with the cutter's centre.
-pub(super) fn around(wall: &[Point2], room: &Room, rough: Option<&Piece>, radius: f64) -> Run {
+fn around(wall: &[Point2], room: &Room, rough: Option<&Piece>, radius: f64) -> Run {
     rough.and_then(|rough| swung(wall, room, rough, radius)).unwrap_or_else(|| {
         let mut around = wall.to_vec();
         around.push(wall[0]);

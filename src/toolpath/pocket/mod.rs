@@ -36,6 +36,7 @@ mod walls;
 mod way;
 
 use air::Air;
+use bounded::Rules;
 use cleared::Cleared;
 pub use cleared::Gentle;
 pub use feed::{Engagement, Exceeding, LEAST_SHARE, engagement, engagement_angle, limit_feed};
@@ -100,134 +101,168 @@ pub fn plan_pocket(
     }
     monitor.start("planning pocket", 0);
     let radius = cutter.radius();
-    let chords = CHORDS_SHARE * settings.chord_tolerance;
     // Straight sides of an inset stand off farther than they are asked to.
     let off = radius + WRITTEN;
     let inset = pocket.free().watched_inset(off - Region::offset_excess(off), monitor)?;
     let walls_at = walls::tangent(inset, pocket.free(), off);
-    if walls_at.is_empty() {
+    let Some(around) = pocket.free().bounds().filter(|_| !walls_at.is_empty()) else {
         let largest = pocket.free().largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
             "a cutter of {} mm fits nowhere in the outline; the largest that would is {:.2} mm",
             2.0 * radius,
             (largest * 100.0).floor() / 100.0
         )));
-    }
+    };
     let rough = if strategy.wall_allowance > 0.0 {
         pocket.free().watched_inset(off + strategy.wall_allowance, monitor)?
     } else {
         walls_at.clone()
     };
     let mut planned = Passes::default();
-    let notes = &mut planned.notes;
     if rough.is_empty() {
-        notes.push(
+        planned.notes.push(
             "no room for passes within the wall allowance: only the pass along the walls is cut".into(),
         );
     }
-    if let Pattern::Streamline(vectors) = &strategy.pattern
-        && let Some(around) = pocket.free().bounds()
-    {
+    if let Pattern::Streamline(vectors) = &strategy.pattern {
         let [low, high] = around.map(|p| Point3::new(p.x, p.y, 0.0));
         let domain = [[low.x, high.x], [low.y, high.y]];
         planned.notes.extend(feed_check(&vectors.direction, &Aabb { min: low, max: high }, &[domain])?);
     }
-    let step = strategy.stepover(settings.step, radius);
-    let mut ground = pocket.free().bounds().map(|around| Cleared::new(around, radius));
-    if let Some(ground) = &mut ground {
-        ground.gentle.clone_from(&strategy.gentle);
-    }
     let air = Air::of(pocket, radius);
-    if let (Some(air), Some(ground)) = (&air, &mut ground) {
-        air.discs.iter().for_each(|p| ground.add(*p));
-    }
-    let rules = strategy.rules(radius, pocket.depth);
-    let (mut peeled, mut left): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
-    let mut bounding = bounded::Bounding::default();
-    let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
-    for piece in &rough.pieces {
-        monitor::check(monitor)?;
-        if let (Some(rules), Some(ground), true) = (&rules, &mut ground, strategy.pattern.peels())
-            && let Some(clearing) = clearing::clear(piece, air.as_ref(), ground, rules, monitor)?
-        {
-            peeled.extend(clearing.peeled);
-            left.extend(clearing.rest);
-            bounding.add(clearing.bounding);
-            continue;
-        }
-        let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut planned, monitor)?;
-        if rules.is_none() {
-            // Passes far from each other may leave something at sharp turns of inner ones.
-            // What passes leave between them on purpose, where the flat of the bottom is narrow, is no rest.
-            let flat = cutter.flat_radius();
-            let reach = if flat > 0.0 && flat < HALF_STEP * step { REST_OVER_STEP * step } else { flat };
-            runs.extend(rest::runs_to_rest(piece, &runs, reach, monitor)?);
-        }
-        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
-        if let (Some(air), None) = (&air, &rules) {
-            let room = walls::Room::new(piece);
-            runs = runs.into_iter().map(|run| air.entered(run, &room)).collect();
-        }
-        groups.push((piece, runs));
-    }
-    let rough_groups = groups.len();
-    if strategy.wall_allowance > 0.0 {
-        for piece in &walls_at.pieces {
-            let room = walls::Room::new(piece);
-            let around = |wall: &[Point2]| {
-                // What is cleared beside this wall.
-                let beside = rough.pieces.iter().min_by(|a, b| {
-                    let away = |piece: &Piece| SegmentGrid::of_curves(piece.curves()).distance(&wall[0]);
-                    away(a).total_cmp(&away(b))
-                });
-                finish::around(wall, &room, beside, radius)
-            };
-            groups.push((piece, piece.curves().map(around).collect()));
-        }
-    }
-    let notes = &mut planned.notes;
-    if walls_at.pieces.len() > 1 {
-        notes.push(format!(
-            "the cutter's centre has room in {} places apart from each other",
-            walls_at.pieces.len()
-        ));
+    let mut ground = Cleared::new(around, radius);
+    ground.gentle.clone_from(&strategy.gentle);
+    air.iter().flat_map(|air| &air.discs).for_each(|p| ground.add(*p));
+    let mut planner = Planner {
+        cutter,
+        strategy,
+        step: strategy.stepover(settings.step, radius),
+        rules: strategy.rules(radius, pocket.depth),
+        air,
+        ground,
+        bounding: bounded::Bounding::default(),
+        planned,
+        monitor,
+    };
+    let (mut clearing, groups) = planner.clear(&rough)?;
+    let along_walls = match strategy.wall_allowance > 0.0 {
+        true => finish::along_walls(&walls_at, &rough, radius),
+        false => Vec::new(),
+    };
+    let apart = walls_at.pieces.len();
+    if apart > 1 {
+        planner
+            .planned
+            .notes
+            .push(format!("the cutter's centre has room in {apart} places apart from each other"));
     }
     let rest = pocket.rest_area(cutter, monitor)?;
-    notes.push(format!(
+    planner.planned.notes.push(format!(
         "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
         pocket.region.area()
     ));
-    for (piece, runs) in &mut groups {
-        let room = walls::Room::new(piece);
-        match (&rules, &mut ground) {
-            (Some(rules), Some(ground)) => {
-                bounding.add(bounded::bound_all(runs, &room, ground, rules, monitor)?);
-            }
-            _ => room.keep_all(runs, monitor)?,
-        }
-    }
-    if rules.is_some() {
-        tell_bounding(&bounding, notes);
-    }
-    let along_walls = groups.split_off(rough_groups).into_iter().flat_map(|group| group.1).collect();
-    let mut runs = peeled;
-    runs.extend(left);
-    runs.extend(groups.into_iter().flat_map(|group| group.1));
-    let trimmed = |runs: Vec<Run>| -> Vec<Run> {
-        let Some(air) = &air else { return runs };
-        runs.into_iter().flat_map(|run| air.trimmed(run)).collect()
-    };
-    let mut runs = descend::Runs { clearing: trimmed(runs), along_walls: trimmed(along_walls) };
+    clearing.extend(planner.kept(groups)?);
+    let along_walls = planner.kept(along_walls)?;
+    let mut runs =
+        descend::Runs { clearing: planner.trimmed(clearing), along_walls: planner.trimmed(along_walls) };
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
     let walls = walls::Walls::new(pocket.free(), off - walls::ROUNDING);
+    let chords = CHORDS_SHARE * settings.chord_tolerance;
     for run in runs.clearing.iter_mut().chain(&mut runs.along_walls) {
         monitor::check(monitor)?;
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
+    let Planner { mut planned, bounding, rules, .. } = planner;
+    if rules.is_some() {
+        tell_bounding(&bounding, &mut planned.notes);
+    }
     planned.contacts.iter_mut().flatten().for_each(|contact| contact.at.z = -pocket.depth);
     Ok(Plan::new(path, Kept::new(planned, strategy)))
+}
+
+/// Runs of pieces of the region in which the cutter's centre has room.
+type Groups<'p> = Vec<(&'p Piece, Vec<Run>)>;
+
+/// Clears one pocket.
+struct Planner<'a> {
+    cutter: &'a Cutter,
+    strategy: &'a PocketStrategy,
+    /// Stepover, mm.
+    step: f64,
+    /// Of an engagement that is asked for.
+    rules: Option<Rules>,
+    /// What lies open beside the pocket.
+    air: Option<Air>,
+    ground: Cleared,
+    /// What kept the engagement to the limit.
+    bounding: bounded::Bounding,
+    planned: Passes,
+    monitor: &'a dyn Monitor,
+}
+
+impl Planner<'_> {
+    /// Runs that are as they will be cut, and others by piece.
+    fn clear<'p>(&mut self, rough: &'p Region) -> Result<(Vec<Run>, Groups<'p>), PlanError> {
+        let (mut peeled, mut left, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+        for piece in &rough.pieces {
+            monitor::check(self.monitor)?;
+            if let (Some(rules), true) = (&self.rules, self.strategy.pattern.peels())
+                && let Some(clearing) =
+                    clearing::clear(piece, self.air.as_ref(), &mut self.ground, rules, self.monitor)?
+            {
+                peeled.extend(clearing.peeled);
+                left.extend(clearing.rest);
+                self.bounding.add(clearing.bounding);
+                continue;
+            }
+            groups.push((piece, self.runs_of(piece)?));
+        }
+        peeled.extend(left);
+        Ok((peeled, groups))
+    }
+
+    fn runs_of(&mut self, piece: &Piece) -> Result<Vec<Run>, PlanError> {
+        let Self { cutter, strategy, step, monitor, .. } = *self;
+        let helix = self.air.is_none();
+        let mut runs = piece_runs(piece, cutter, strategy, step, helix, &mut self.planned, monitor)?;
+        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
+        if self.rules.is_some() {
+            return Ok(runs);
+        }
+        // Passes far from each other may leave something at sharp turns of inner ones.
+        // What passes leave between them on purpose, where the flat of the bottom is narrow, is no rest.
+        let flat = cutter.flat_radius();
+        let reach = if flat > 0.0 && flat < HALF_STEP * step { REST_OVER_STEP * step } else { flat };
+        runs.extend(rest::runs_to_rest(piece, &runs, reach, monitor)?);
+        let Some(air) = &self.air else { return Ok(runs) };
+        let room = walls::Room::new(piece);
+        Ok(runs.into_iter().map(|run| air.entered(run, &room)).collect())
+    }
+
+    /// All runs, within the room that their pieces have and the engagement that is asked for.
+    fn kept(&mut self, groups: Groups<'_>) -> Result<Vec<Run>, PlanError> {
+        let mut kept = Vec::new();
+        for (piece, mut runs) in groups {
+            let room = walls::Room::new(piece);
+            match &self.rules {
+                Some(rules) => {
+                    let did = bounded::bound_all(&mut runs, &room, &mut self.ground, rules, self.monitor)?;
+                    self.bounding.add(did);
+                }
+                None => room.keep_all(&mut runs, self.monitor)?,
+            }
+            kept.extend(runs);
+        }
+        Ok(kept)
+    }
+
+    /// What is left of runs where nothing lies open.
+    fn trimmed(&self, runs: Vec<Run>) -> Vec<Run> {
+        let Some(air) = &self.air else { return runs };
+        runs.into_iter().flat_map(|run| air.trimmed(run)).collect()
+    }
 }
 
 /// Notes what kept the engagement to the limit, and where nothing did.

@@ -1,0 +1,56 @@
+//! Which move of which toolpath, and which line of its program, cut each gouge.
+
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use metrology::GougeRegion;
+use motion::{Cutters, Toolpath};
+use sim::NOT_CUT;
+
+use super::earlier::{EarlierPath, WholePath};
+
+/// The moves of the last toolpath, and what makes them.
+#[derive(Clone, Copy)]
+pub(crate) struct OwnMoves<'a> {
+    pub path: &'a Toolpath,
+    pub cutters: &'a Cutters,
+}
+
+/// Names the moves of gouges, which are told by their index in the `whole` path. Where stock itself lies below the part
+/// no move cut.
+pub(crate) fn name(
+    regions: &mut [GougeRegion],
+    whole: &WholePath<'_>,
+    earlier: &[EarlierPath],
+    own: OwnMoves<'_>,
+) {
+    for region in regions.iter_mut().filter(|region| region.move_index != NOT_CUT) {
+        let at = region.at_mm.into();
+        let (toolpath, move_index) = whole.own_move(region.move_index);
+        let its = earlier.get(toolpath);
+        let OwnMoves { path, cutters } =
+            its.map_or(own, |before| OwnMoves { path: &before.path, cutters: &before.cutters });
+        region.move_index = move_index;
+        region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
+        region.tool = path.named_tool_of(move_index as usize);
+        region.toolpath = its.map(|before| before.name.clone());
+    }
+}
+
+/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line before where the
+/// move begins there.
+fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
+    /// Places along the move; a start that is lowest by less than a share of it counts as its end.
+    const PLACES: u32 = 64;
+    let line = |k: usize| path.line_of(k).unwrap_or_default();
+    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return line(step) };
+    let (from, to) = (path.location_before(step), this.to);
+    if from.axis != Vector3::z() || to.axis != from.axis {
+        return line(step);
+    }
+    let height = |k: u32| {
+        let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
+        cutter.height((tip.x - at.x).hypot(tip.y - at.y)).map_or(f64::INFINITY, |above| tip.z + above)
+    };
+    let begins = (1..=PLACES).all(|k| height(k) >= height(0));
+    line(if begins { before } else { step })
+}
