@@ -6,14 +6,20 @@
 //! the outlines and is not followed: clips, masks, filters, `use`, animations, shapes for some readers only, and style sheets
 //! that show, hide, place or size shapes. Sheets of colours and pens are passed over; texts and images are named.
 
+mod page;
+mod style;
+
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use roxmltree::{Document, Node};
-use svgtypes::{Length, LengthUnit, PathParser, PathSegment, PointsParser, Transform, ViewBox};
+use svgtypes::{PathParser, PathSegment, PointsParser};
+
+use page::{Map, map_of, transformed, user};
+use style::{MARKERS, Pens, check_sheet, check_style, is_any, is_displayed, is_usual, keyword, property_of};
 
 use super::{Chords, Drawn, OutlineError, OutlineFormat, OutlineOptions};
-use geometry::{Point2, Vector2};
+use geometry::Point2;
 
 /// Scalable Vector Graphics.
 pub const FORMAT: OutlineFormat = OutlineFormat { extension: "svg", parse };
@@ -21,126 +27,11 @@ pub const FORMAT: OutlineFormat = OutlineFormat { extension: "svg", parse };
 /// Deepest nesting of elements that is followed.
 const MAX_DEPTH: usize = 64;
 
-/// Properties that hide, clip or place outlines and are read from styles of single elements, and as attributes.
-const READ: [&str; 9] = [
-    "display",
-    "visibility",
-    "opacity",
-    "fill-opacity",
-    "stroke-opacity",
-    "clip-path",
-    "mask",
-    "filter",
-    "transform-origin",
-];
-
-/// Properties of a style that hide, place or size outlines and are not read from there.
-const SHAPING: [&str; 29] = [
-    "transform",
-    "-webkit-transform",
-    "translate",
-    "rotate",
-    "scale",
-    "zoom",
-    "offset",
-    "offset-path",
-    "animation",
-    "animation-name",
-    "mask-image",
-    "-webkit-mask",
-    "-webkit-mask-image",
-    "-webkit-clip-path",
-    "-webkit-filter",
-    "transform-box",
-    "content-visibility",
-    "all",
-    "d",
-    "x",
-    "y",
-    "cx",
-    "cy",
-    "r",
-    "rx",
-    "ry",
-    "width",
-    "height",
-    "vector-effect",
-];
-
 /// Elements by which a drawing moves or changes.
 const ANIMATIONS: [&str; 6] =
     ["animate", "animateColor", "animateMotion", "animateTransform", "discard", "set"];
 
-/// Properties by which shapes of a drawing are drawn at the corners of others.
-const MARKERS: [&str; 4] = ["marker", "marker-start", "marker-mid", "marker-end"];
-
 const NAMESPACE: &str = "http://www.w3.org/2000/svg";
-
-/// mm of one CSS pixel.
-const PIXEL: f64 = 25.4 / 96.0;
-
-/// From the drawing's own coordinates to mm, y up.
-#[derive(Debug, Clone, Copy)]
-struct Map {
-    x: Vector2,
-    y: Vector2,
-    origin: Point2,
-}
-
-impl Map {
-    fn at(&self, x: f64, y: f64) -> Point2 {
-        self.origin + self.x * x + self.y * y
-    }
-
-    fn then(&self, t: &Transform) -> Self {
-        Self { x: self.x * t.a + self.y * t.b, y: self.x * t.c + self.y * t.d, origin: self.at(t.e, t.f) }
-    }
-}
-
-/// Which pens draw a shape: those of the elements around it, where it has none of its own.
-#[derive(Debug, Clone, Copy)]
-struct Pens {
-    fill: bool,
-    fill_shows: bool,
-    stroke: bool,
-    stroke_shows: bool,
-    stroke_is_wide: bool,
-}
-
-impl Pens {
-    /// Those of a drawing that names none.
-    const USUAL: Self =
-        Self { fill: true, fill_shows: true, stroke: false, stroke_shows: true, stroke_is_wide: true };
-
-    fn within(self, node: &Node<'_, '_>) -> Result<Self, OutlineError> {
-        let paints = |property: &str, usual: bool| match property_of(node, property).as_deref() {
-            None | Some("inherit") => usual,
-            Some(paint) => has_colour(paint),
-        };
-        let shows = |property: &str, usual: bool| -> Result<bool, OutlineError> {
-            Ok(match property_of(node, property).as_deref() {
-                None | Some("inherit") => usual,
-                Some(value) => shows(node, property, value)?,
-            })
-        };
-        let is_wide = match property_of(node, "stroke-width").as_deref() {
-            None | Some("inherit") => self.stroke_is_wide,
-            Some(width) => !width.parse::<Length>().is_ok_and(|width| width.number == 0.0),
-        };
-        Ok(Self {
-            fill: paints("fill", self.fill),
-            fill_shows: shows("fill-opacity", self.fill_shows)?,
-            stroke: paints("stroke", self.stroke),
-            stroke_shows: shows("stroke-opacity", self.stroke_shows)?,
-            stroke_is_wide: is_wide,
-        })
-    }
-
-    fn draw(self, shape: &str) -> bool {
-        let fills = self.fill && self.fill_shows && shape != "line";
-        fills || (self.stroke && self.stroke_shows && self.stroke_is_wide)
-    }
-}
 
 /// Where an element stands: what it has from those around it.
 #[derive(Clone, Copy)]
@@ -172,165 +63,6 @@ fn line_of(node: &Node<'_, '_>) -> usize {
 fn fault(node: &Node<'_, '_>, what: impl std::fmt::Display) -> OutlineError {
     let id = node.attribute("id").map_or_else(String::new, |id| format!(" \"{id}\""));
     OutlineError::at(line_of(node), format!("{}{id}: {what}", node.tag_name().name()))
-}
-
-/// Without comments of style sheets.
-fn without_comments(text: &str) -> String {
-    let mut rest = text;
-    let mut bare = String::new();
-    while let Some((before, after)) = rest.split_once("/*") {
-        bare.push_str(before);
-        rest = after.split_once("*/").map_or("", |(_, after)| after);
-    }
-    bare.push_str(rest);
-    bare
-}
-
-/// Refuses rules of a style sheet that shape or hide outlines: they are not applied. Says whether its rules set pens.
-fn check_sheet(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
-    let text: String = node.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
-    let bare = without_comments(&text);
-    if bare.contains("@import") {
-        return Err(fault(node, "rules of other files are not read; save the drawing without them"));
-    }
-    let mut has_pens = false;
-    for block in bare.split('{').skip(1).filter_map(|block| block.split('}').next()) {
-        let shaping = declarations(block).find(|(property, value)| {
-            (is_any(property, &SHAPING) || is_any(property, &READ)) && !is_usual(property, value)
-        });
-        // A rule that takes away both pens hides what it is for.
-        let is_without = |pen: &str| {
-            let of = declarations(block).filter(|(property, _)| property.eq_ignore_ascii_case(pen));
-            of.last().is_some_and(|(_, value)| !has_colour(&keyword(value)))
-        };
-        let both = (is_without("fill") && is_without("stroke")).then_some("stroke");
-        if let Some(property) = shaping.map(|s| s.0).or(both) {
-            return Err(fault(
-                node,
-                format!(
-                    "its rules set `{property}`, which is not read from there; save the drawing with presentation attributes \
-                     instead of a style sheet"
-                ),
-            ));
-        }
-        has_pens |=
-            declarations(block).any(|(property, _)| is_any(property, &["fill", "stroke", "stroke-width"]));
-    }
-    Ok(has_pens)
-}
-
-/// Properties and values of a list of declarations.
-fn declarations(text: &str) -> impl Iterator<Item = (&str, &str)> {
-    let pairs = text.split(';').filter_map(|declaration| declaration.split_once(':'));
-    pairs.map(|(property, value)| (property.trim(), value.trim()))
-}
-
-fn is_any(property: &str, of: &[&str]) -> bool {
-    of.iter().any(|one| property.eq_ignore_ascii_case(one))
-}
-
-/// A value as it is compared.
-fn keyword(value: &str) -> String {
-    let value = value.trim().to_ascii_lowercase();
-    value.strip_suffix("!important").unwrap_or(&value).trim_end().to_owned()
-}
-
-/// The value of a property of an element itself: its style goes before its attribute.
-fn property_of(node: &Node<'_, '_>, property: &str) -> Option<String> {
-    let style = node.attribute("style").map(without_comments).unwrap_or_default();
-    let of = declarations(&style).filter(|(name, _)| name.eq_ignore_ascii_case(property));
-    let stated = of.map(|(_, value)| value).max_by_key(|value| value.ends_with("!important"));
-    stated.or_else(|| node.attribute(property)).map(keyword)
-}
-
-/// Whether a paint is one.
-fn has_colour(paint: &str) -> bool {
-    match svgtypes::Paint::from_str(paint) {
-        Ok(svgtypes::Paint::None) => false,
-        Ok(svgtypes::Paint::Color(colour)) => colour.alpha > 0,
-        _ => paint != "transparent",
-    }
-}
-
-/// Whether something of an opacity is seen.
-fn shows(node: &Node<'_, '_>, property: &str, opacity: &str) -> Result<bool, OutlineError> {
-    if ["initial", "unset", "revert"].contains(&opacity) {
-        return Ok(true);
-    }
-    let number = opacity.strip_suffix('%').unwrap_or(opacity).trim_end().parse::<f64>();
-    let number = number.map_err(|_| fault(node, format!("{property} = \"{opacity}\" is not a number")))?;
-    Ok(number > 0.0)
-}
-
-/// Whether a value is the usual one, by which shapes are drawn where they stand.
-fn is_usual(property: &str, value: &str) -> bool {
-    let value = keyword(value);
-    let usual: &[&str] = match property.to_ascii_lowercase().as_str() {
-        "display" => &["inline", "block", "initial", "inherit"],
-        "visibility" => &["visible", "initial", "inherit"],
-        "opacity" | "fill-opacity" | "stroke-opacity" => {
-            let number = value.strip_suffix('%').unwrap_or(&value).trim_end().parse::<f64>();
-            return number.map_or_else(|_| ["initial", "inherit"].contains(&value.as_str()), |x| x > 0.0);
-        }
-        "transform-origin" => &["0 0", "0px 0px", "0% 0%", "initial"],
-        "transform-box" => &["view-box", "initial"],
-        "content-visibility" => &["visible", "initial"],
-        "vector-effect" => &["none", "non-scaling-stroke", "initial"],
-        "transform" | "-webkit-transform" | "translate" | "rotate" | "scale" | "clip-path"
-        | "-webkit-clip-path" | "mask" | "mask-image" | "-webkit-mask" | "-webkit-mask-image" | "filter"
-        | "-webkit-filter" | "offset-path" | "offset" | "animation" | "animation-name" => {
-            &["none", "initial"]
-        }
-        _ => &["auto"],
-    };
-    usual.contains(&value.as_str())
-}
-
-/// Whether an element and what it holds is displayed.
-///
-/// # Errors
-/// Where its style shapes it in another way, and where something within what is hidden is shown again.
-fn is_displayed(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
-    let of = |property: &str| property_of(node, property);
-    for property in ["display", "visibility"] {
-        if let Some(value) = of(property).filter(|value| value.contains('(')) {
-            return Err(fault(node, format!("{property} = \"{value}\" is not read; write a word")));
-        }
-    }
-    if of("display").as_deref() == Some("none") {
-        return Ok(false);
-    }
-    if let Some(opacity) = of("opacity").filter(|opacity| opacity != "inherit")
-        && !shows(node, "opacity", &opacity)?
-    {
-        return Ok(false);
-    }
-    // Nobody here is one of those who have an extension.
-    if node.attribute("requiredExtensions").is_some() {
-        return Ok(false);
-    }
-    if of("visibility").is_some_and(|value| ["hidden", "collapse"].contains(&value.as_str())) {
-        let is_again = |n: &Node<'_, '_>| property_of(n, "visibility").as_deref() == Some("visible");
-        return match node.descendants().skip(1).find(is_again) {
-            Some(again) => {
-                Err(fault(&again, "it is visible within what is hidden; show or delete the whole"))
-            }
-            None => Ok(false),
-        };
-    }
-    Ok(true)
-}
-
-/// Refuses a style that shapes outlines in a way that is not read, but for what `is_passed_over`.
-fn check_style(node: &Node<'_, '_>, is_passed_over: impl Fn(&str, &str) -> bool) -> Result<(), OutlineError> {
-    let style = node.attribute("style").map(without_comments).unwrap_or_default();
-    let mut shaping = declarations(&style).filter(|(property, _)| is_any(property, &SHAPING));
-    match shaping.find(|(property, value)| !is_usual(property, value) && !is_passed_over(property, value)) {
-        Some((property, _)) => {
-            Err(fault(node, format!("its style sets `{property}`; write that as an attribute of its own")))
-        }
-        None => Ok(()),
-    }
 }
 
 fn is_animation(node: &Node<'_, '_>) -> bool {
@@ -377,119 +109,6 @@ fn is_named(node: &Node<'_, '_>, name: &str) -> bool {
     node.attributes().any(|a| ["id", "label"].contains(&a.name()) && a.value() == name)
 }
 
-/// From the coordinates within an element to mm.
-fn transformed(node: &Node<'_, '_>, map: Map) -> Result<Map, OutlineError> {
-    let Some(text) = node.attribute("transform") else { return Ok(map) };
-    let transform = text.parse().map_err(|e| fault(node, format!("transform = \"{text}\": {e}")))?;
-    if property_of(node, "transform-box").is_some_and(|value| !is_usual("transform-box", &value)) {
-        return Err(fault(node, "its `transform-box` is not read; write a matrix as its `transform`"));
-    }
-    let Some(origin) = property_of(node, "transform-origin") else { return Ok(map.then(&transform)) };
-    let about = |[x, y]: [f64; 2]| {
-        let shift = |x: f64, y: f64| Transform::new(1.0, 0.0, 0.0, 1.0, x, y);
-        map.then(&shift(x, y)).then(&transform).then(&shift(-x, -y))
-    };
-    let mut lengths =
-        origin.split([' ', ',', '\t', '\n', '\r']).filter(|part| !part.is_empty()).map(in_units);
-    match [lengths.next().flatten(), lengths.next().flatten()] {
-        [Some(x), Some(y)] => Ok(about([x, y])),
-        _ if is_usual("transform-origin", &origin) => Ok(map.then(&transform)),
-        _ => {
-            let what = format!(
-                "transform-origin = \"{origin}\" depends on the page or the shape; write two numbers"
-            );
-            Err(fault(node, what))
-        }
-    }
-}
-
-/// A length in units of the drawing, where it does not depend on the page.
-fn in_units(text: &str) -> Option<f64> {
-    let length: Length = text.parse().ok()?;
-    let units = match length.unit {
-        LengthUnit::None => Some(length.number),
-        LengthUnit::Percent => (length.number == 0.0).then_some(0.0),
-        _ => millimetres(length).map(|mm| mm / PIXEL),
-    };
-    units.filter(|units| units.is_finite())
-}
-
-/// A length in mm where it has a unit, else `None` with its bare number.
-fn millimetres(length: Length) -> Option<f64> {
-    let unit = match length.unit {
-        LengthUnit::Px | LengthUnit::None => PIXEL,
-        LengthUnit::Mm => 1.0,
-        LengthUnit::Cm => 10.0,
-        LengthUnit::In => 25.4,
-        LengthUnit::Pt => 25.4 / 72.0,
-        LengthUnit::Pc => 25.4 / 6.0,
-        LengthUnit::Em | LengthUnit::Ex | LengthUnit::Percent => return None,
-    };
-    Some(length.number * unit)
-}
-
-/// A length of a shape, in units of the drawing.
-fn user(node: &Node<'_, '_>, name: &str) -> Result<Option<f64>, OutlineError> {
-    let Some(text) = node.attribute(name) else { return Ok(None) };
-    let length: Length = text.parse().map_err(|e| fault(node, format!("{name} = \"{text}\": {e}")))?;
-    let units = if length.unit == LengthUnit::None {
-        Some(length.number)
-    } else {
-        millimetres(length).map(|mm| mm / PIXEL)
-    };
-    let units = units.ok_or_else(|| {
-        fault(node, format!("{name} = \"{text}\" depends on the page or a letter; write a number"))
-    })?;
-    if units.is_finite() {
-        Ok(Some(units))
-    } else {
-        Err(fault(node, format!("{name} is not a finite number")))
-    }
-}
-
-fn page(root: &Node<'_, '_>, options: &OutlineOptions, notes: &mut Vec<String>) -> Result<Map, OutlineError> {
-    let length = |name: &str| -> Result<Option<Length>, OutlineError> {
-        let Some(text) = root.attribute(name) else { return Ok(None) };
-        let length: Length = text.parse().map_err(|e| fault(root, format!("{name} = \"{text}\": {e}")))?;
-        Ok((length.unit != LengthUnit::Percent).then_some(length))
-    };
-    let (width, height) = (length("width")?, length("height")?);
-    let size = |l: Option<Length>| l.and_then(millimetres);
-    let view: Option<ViewBox> = match root.attribute("viewBox") {
-        Some(text) => Some(text.parse().map_err(|e| fault(root, format!("viewBox = \"{text}\": {e}")))?),
-        None => None,
-    };
-    let (x0, y0, h) = view.map_or((0.0, 0.0, None), |v| (v.x, v.y, Some(v.h)));
-    let by_page = |size: Option<f64>, view: Option<f64>| size.zip(view).map(|(s, v)| s / v);
-    let scales = [by_page(size(width), view.map(|v| v.w)), by_page(size(height), view.map(|v| v.h))];
-    let scale = match (options.scale, scales) {
-        (Some(scale), _) => scale,
-        (None, [Some(x), Some(y)]) if (x / y - 1.0).abs() > 1e-3 => {
-            return Err(fault(
-                root,
-                format!(
-                    "width and height stretch the viewBox by different amounts ({x:.5} and {y:.5} mm a unit)"
-                ),
-            ));
-        }
-        (None, [Some(scale), _] | [None, Some(scale)]) => scale,
-        (None, [None, None]) => PIXEL,
-    };
-    let named = |l: Option<Length>| l.is_some_and(|l| !matches!(l.unit, LengthUnit::None | LengthUnit::Px));
-    if options.scale.is_none() && !named(width) && !named(height) {
-        notes.push("the drawing has no unit; 96 of its units make an inch".into());
-    }
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(fault(root, format!("one unit of the drawing is {scale} mm")));
-    }
-    let bottom = h.or_else(|| size(height).map(|mm| mm / scale)).unwrap_or(0.0);
-    Ok(Map {
-        x: Vector2::new(scale, 0.0),
-        y: Vector2::new(0.0, -scale),
-        origin: Point2::new(-x0 * scale, (y0 + bottom) * scale),
-    })
-}
-
 /// The drawn elements, mm.
 fn parse(
     bytes: &[u8],
@@ -510,7 +129,7 @@ fn parse(
     if root.tag_name().name() != "svg" {
         return Err(OutlineError::at(1, format!("its root is <{}>, not <svg>", root.tag_name().name())));
     }
-    let map = page(&root, options, notes)?;
+    let map = map_of(&root, options, notes)?;
     let mut sheet_has_pens = false;
     for node in root.descendants() {
         if node.tag_name().name() == "style" {
