@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         most_cells: 1_000_000,
         most_squares: 1_000_000,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     let found = measure(&part, &cutter, &path, &stock, &limits, &asked, &Silent)?;

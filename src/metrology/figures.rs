@@ -287,23 +287,6 @@ impl ExcessFigures {
             unreached: self.unreached.or(&other.unreached),
         }
     }
-
-    /// Of cells alone: what stands on them, highest at a place, and the bounds of ridges and uncut places.
-    pub(crate) fn of_cells(measured: &Measurement, highest_at: Option<[f64; 3]>) -> Self {
-        let (scallop, uncut) = (&measured.scallop, &measured.uncut);
-        let unreached = Bounded {
-            at_mm: uncut.regions.first().map(|region| region.at_mm),
-            ..Bounded::new(uncut.max_height_mm, uncut.error_bound_mm)
-        };
-        let bound = scallop.error_bound_mm.unwrap_or(uncut.error_bound_mm);
-        let ridge =
-            Bounded { at_mm: scallop.max_at_mm, ..Bounded::new(scallop.max_mm.unwrap_or(0.0), bound) };
-        let place = measured.deviation.max_mm.filter(|_| uncut.max_height_mm <= 0.0).unwrap_or(0.0);
-        let place = Bounded { at_mm: highest_at, ..Bounded::new(place.max(0.0), uncut.error_bound_mm) };
-        let reached = ridge.or(&place);
-        let kind = if unreached.max_mm > reached.max_mm { ExcessKind::Uncut } else { ExcessKind::Scallop };
-        Self { highest: reached.or(&unreached), kind, reached, unreached }
-    }
 }
 
 /// Signed deviation over all samples. `None` (and a reason) where nothing was measured.

@@ -41,7 +41,7 @@ pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cel
     let asked = Asked {
         error_bound: 5e-4,
         stock_top: top,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
         most_cells: 1 << 20,
         most_squares: 1 << 20,

@@ -94,8 +94,7 @@ pub(crate) fn measure_with_walls(
         creases: Some(&creases),
         walls: walls.as_ref(),
         steepest: if asked.steep_elsewhere { STEEP } else { LEAST_FACING },
-        // What is left where a ridge is none comes to light in the search for the highest material alone.
-        every_move: asked.borders.then_some(&every_move),
+        every_move: Some(&every_move),
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
@@ -120,19 +119,10 @@ pub(crate) fn measure_with_walls(
     let hiding = inspection.raise_by_moves(path, &found.samples, &mut measured.gouge, monitor)?;
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
-    if asked.borders {
+    if asked.border_cuts {
         inspection.cut_borders(&mut measured.gouge, monitor)?;
     }
     let was_doubted = doubt(&mut measured, part, &every_move, bound);
-    if !asked.borders {
-        let deviation = |k: &usize| found.samples[*k].deviation;
-        let seen = (0..found.samples.len()).filter(|k| !deviation(k).is_nan());
-        let highest = seen.max_by(|a, b| deviation(a).total_cmp(&deviation(b)));
-        let at = highest.and_then(|k| inspection.design_at(grid.centre(k % grid.nx, k / grid.nx)));
-        measured.excess = ExcessFigures::of_cells(&measured, at.map(|at| at.point.into()));
-        tell_doubt(&mut measured, was_doubted);
-        return Ok(measured);
-    }
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top };
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;
     measured.excess = excess;

@@ -198,7 +198,7 @@ mod tests {
             most_cells: 1_000_000,
             most_squares: 1_000_000,
             is_first_look: false,
-            borders: true,
+            border_cuts: true,
             steep_elsewhere: false,
         };
         measure(&plate(), &Cutter::ball(6.0).unwrap(), path, stock, &limits, &asked, &Silent)

@@ -282,7 +282,7 @@ mod tests {
             let asked = Asked {
                 error_bound: 5e-4,
                 stock_top: 1.0,
-                borders: true,
+                border_cuts: true,
                 steep_elsewhere: false,
                 most_cells: 1 << 20,
                 most_squares: 1 << 20,

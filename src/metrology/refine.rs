@@ -40,8 +40,8 @@ pub struct Asked {
     pub error_bound: f64,
     /// Height of the stock's flat top before the cut, mm.
     pub stock_top: f64,
-    /// Whether the highest material is looked for up to the part's borders; else on the cells only.
-    pub borders: bool,
+    /// Whether cuts beside the part's borders are looked for. Beside the floor of a pocket stand its walls, which tell theirs.
+    pub border_cuts: bool,
     /// Cells that may be held beside those of the stock at a time.
     pub most_cells: usize,
     /// Squares that a search between cell centres may hold at a time.

@@ -17,7 +17,7 @@ const TOP: f64 = 2.0;
 const ASKED: Asked = Asked {
     error_bound: 5e-4,
     stock_top: TOP,
-    borders: true,
+    border_cuts: true,
     steep_elsewhere: false,
     most_cells: 1 << 20,
     most_squares: 1 << 20,

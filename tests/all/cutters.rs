@@ -83,7 +83,7 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
         most_cells: 1 << 22,
         most_squares: 1 << 22,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     let of = |cutter: &Cutter| {

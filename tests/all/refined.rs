@@ -52,7 +52,7 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
         most_cells: cells,
         most_squares: 1 << 22,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     measure(&part, cutter, path, &stock, limits, &asked, &Silent).unwrap()

@@ -61,7 +61,7 @@ pub fn cut_and_measure(
         most_cells: 1 << 20,
         most_squares: 1 << 22,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()

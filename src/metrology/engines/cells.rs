@@ -91,7 +91,7 @@ impl Engine for Cells {
             most_cells,
             most_squares: task.budget.squares_beside(held, &grid),
             is_first_look: task.is_first_look,
-            borders: !task.pocket,
+            border_cuts: !task.pocket,
             steep_elsewhere: !task.pocket,
         };
         let facing = task.measures_walls().then(|| task.facing());

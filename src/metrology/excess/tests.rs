@@ -97,7 +97,7 @@ fn measured_holding(
         most_cells: 1 << 20,
         most_squares,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()

@@ -55,7 +55,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
         most_cells: 1 << 20,
         most_squares: 1 << 20,
         is_first_look: false,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()

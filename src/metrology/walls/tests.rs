@@ -68,7 +68,7 @@ fn measured_on(cell: f64, part: &Part, cutter: &Cutter, path: &Toolpath) -> Meas
     let asked = Asked {
         error_bound: 5e-4,
         stock_top: area.max.z,
-        borders: true,
+        border_cuts: true,
         steep_elsewhere: false,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
