@@ -22,6 +22,9 @@ use geometry::{Piece, Point2};
 /// triangles and no better levels.
 const LEAST_ANGLE: f64 = 20.0;
 
+/// Vertices that are added to a piece for each of its corners, at most, to fill it without slivers.
+const MOST_ADDED: usize = 8;
+
 /// Most vertices of a mesh: some 300 MiB while its equations are solved.
 pub const MAX_VERTICES: usize = 400_000;
 
@@ -56,7 +59,8 @@ pub struct PlanarMesh {
 type Triangles = (Vec<Point2>, Vec<[u32; 3]>, Vec<bool>);
 
 /// Corners of a triangulation of a piece, counter-clockwise, and which lie on its walls. With `edge` no
-/// triangle is larger than an equilateral one of that side, mm; without it none but the corners are added.
+/// triangle is larger than an equilateral one of that side, mm; without it as few are added as keep
+/// triangles from being slivers.
 fn triangulate(piece: &Piece, edge: Option<f64>) -> Result<Triangles, PlanarError> {
     let mut vertices = Vec::new();
     let mut edges = Vec::new();
@@ -65,6 +69,7 @@ fn triangulate(piece: &Piece, edge: Option<f64>) -> Result<Triangles, PlanarErro
         vertices.extend(curve.iter().map(|p| spade::Point2::new(p.x, p.y)));
         edges.extend((0..n).map(|k| [first + k, first + (k + 1) % n]));
     }
+    let corners = vertices.len();
     let mut conflicts = 0usize;
     let mut cdt: ConstrainedDelaunayTriangulation<spade::Point2<f64>> =
         ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, edges, |_| conflicts += 1)
@@ -78,7 +83,9 @@ fn triangulate(piece: &Piece, edge: Option<f64>) -> Result<Triangles, PlanarErro
             .with_angle_limit(AngleLimit::from_deg(LEAST_ANGLE))
             .with_max_allowed_area(0.433 * edge * edge)
             .with_max_additional_vertices(MAX_VERTICES),
-        None => parameters.with_angle_limit(AngleLimit::from_deg(0.0)).with_max_additional_vertices(0),
+        None => parameters
+            .with_angle_limit(AngleLimit::from_deg(LEAST_ANGLE))
+            .with_max_additional_vertices(MOST_ADDED * corners),
     };
     let refined = cdt.refine(parameters);
     if edge.is_some() && !refined.refinement_complete {
@@ -109,7 +116,7 @@ fn triangulate(piece: &Piece, edge: Option<f64>) -> Result<Triangles, PlanarErro
     Ok((points, triangles, wall))
 }
 
-/// The piece as few triangles, counter-clockwise.
+/// The piece as few triangles, counter-clockwise, hardly any of which are slivers.
 ///
 /// # Errors
 /// [`PlanarError::Triangulation`].

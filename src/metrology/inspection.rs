@@ -203,8 +203,10 @@ impl Inspection<'_> {
         let high = 2.0 * cut.distance.max(0.0) + 0.25 * self.grid.cell;
         let half = 0.5 * self.grid.cell + high * normal.xy().norm();
         let mut top = f64::NEG_INFINITY;
+        let shape = self.surface.cut.shape.as_ref().filter(|_| cut.by == NOT_CUT);
+        let stock = shape.map(|shape| shape.highest_within(p.x, p.y, half));
         for (sx, sy) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
-            let z = self.surface.height(cut.by, p.x + sx, p.y + sy);
+            let z = stock.unwrap_or_else(|| self.surface.height(cut.by, p.x + sx, p.y + sy));
             top = top.max((z - p.z) * normal.z + sx * normal.x + sy * normal.y);
         }
         let (mut turned, mut cosine, mut steepest) = (0f64, 1f64, 0f64);

@@ -195,7 +195,7 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
     const EQUAL: f64 = 0.05;
     let Inspection { part, cutters, surface, .. } = *inspection;
     let (reached, scallop) = (measured.excess.reached, &mut measured.scallop);
-    let place = reached.at_mm.filter(|_| reached.max_mm > scallop.max_mm.unwrap_or(0.0));
+    let place = reached.at_mm.filter(|_| reached.max_mm > scallop.max_mm.unwrap_or(NUMERICAL_FLOOR));
     let Some(design) = place.and_then(|[x, y, _]| part.highest_at(x, y)) else { return };
     let top = design.point + design.normal * reached.max_mm;
     let all: Vec<u32> = (0..path.len() as u32).collect();

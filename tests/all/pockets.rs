@@ -341,3 +341,66 @@ fn what_chords_of_drawings_are_off_is_in_the_bounds() {
     let told = row.split(" ± ").last().and_then(|rest| rest.split(' ').next()).unwrap();
     assert!(told.parse::<f64>().unwrap() >= 1e3 * (cut - depth) - 0.01, "{row}");
 }
+
+/// A flat that cuts all of the floor but goes round one place leaves a post there, thinner than a cell. Its height is the depth; a
+/// circle through that place leaves nothing.
+#[test]
+fn a_post_thinner_than_a_cell_is_uncut() {
+    let home = tempfile::tempdir().unwrap();
+    let program = |around: f64| {
+        let mut text =
+            String::from("G17 G21 G40 G90 G94\nS8000 M3\nG0 X2 Y2 Z3\nG0 X7.7 Y5.5\nG1 Z-1 F300\n");
+        for k in 1..=200 {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 200.0).sin_cos();
+            text += &format!("G1 X{:.4} Y{:.4} F500\n", 5.0567 + around * cos, 5.5089 + around * sin);
+        }
+        // Beyond the circle.
+        text += "G1 X9 Y5.5\nG1 X9 Y8\nG1 X2 Y8\nG1 X2 Y2\nG1 X9 Y2\nG1 X9 Y5.5\nG0 Z3\nM30\n";
+        text
+    };
+    for (around, post) in [(2.003, true), (1.99, false)] {
+        fs::write(home.path().join("post.nc"), program(around)).unwrap();
+        let text = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [11, 0], [11, 10], [0, 10]]\ndepth = 1\n[cutter]\n\
+                    shape = \"flat\"\ndiameter = 4\n[tolerance]\nchord = 0.002\n[[toolpath]]\nstrategy = \"program\"\n\
+                    file = \"post.nc\"\n";
+        for cell in ["auto", "0.2"] {
+            let text = text.replace(
+                "[[toolpath]]",
+                &if cell == "auto" {
+                    "[[toolpath]]".to_owned()
+                } else {
+                    format!("[simulation]\ncell = {cell}\n[[toolpath]]")
+                },
+            );
+            let (_, toolpath) = judged(home.path(), &text);
+            let excess = &toolpath["excess"];
+            let [height, bound] = ["max_mm", "error_bound_mm"].map(|key| excess[key].as_f64().unwrap());
+            let expected = if post { 1.0 } else { 0.0 };
+            assert!((height - expected).abs() <= bound && bound < 1e-5, "{cell} {around}: {excess}");
+            assert_eq!(violations(&toolpath).iter().any(|text| text.contains("uncut")), post, "{toolpath:#}");
+        }
+    }
+}
+
+/// The highest ridge of a ball on a pocket's floor is told within its bound on cells of any size, as the moves themselves leave it.
+#[test]
+fn ridges_in_pockets_do_not_depend_on_cells() {
+    let home = tempfile::tempdir().unwrap();
+    let mut figures = Vec::new();
+    for cell in ["0.02", "0.07", "0.2"] {
+        let text = format!(
+            "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [4.596, 0], [4.426, 3.636], [0.232, 3.609]]\ndepth = 1\n[cutter]\n\
+             shape = \"ball\"\ndiameter = 1.5\n[tolerance]\nscallop = 0.29\nuncut = 0.29\n[simulation]\ncell = {cell}\n\
+             [[toolpath]]\nstrategy = \"pocket-flow\"\nstepover = 0.67\n"
+        );
+        let (code, toolpath) = judged(home.path(), &text);
+        let excess = &toolpath["excess"];
+        let [height, bound] = ["max_mm", "error_bound_mm"].map(|key| excess[key].as_f64().unwrap());
+        assert!(bound < 1e-5 && code == Some(1), "{cell}: {toolpath:#}");
+        figures.push(height);
+    }
+    // 0.29928 mm over the moves of the program, by their distance from the place climbed to.
+    for height in figures {
+        assert!((height - 0.29928).abs() < 2e-5, "{height}");
+    }
+}

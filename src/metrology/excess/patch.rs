@@ -6,6 +6,7 @@ use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
+use crate::figures::NUMERICAL_FLOOR;
 use crate::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -279,14 +280,21 @@ impl Patches<'_> {
     }
 
     /// What stands above a piece of a square at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
-    /// All moves are asked where those that cells show tell nothing, and in a `small` square where they leave a wall.
+    /// All moves are asked where those that cells show tell nothing or no more than the stock, and in a `small` square where they leave a
+    /// wall.
     fn above(&self, piece: &Clipped, half: f64, small: bool) -> Option<(f64, f64, u32)> {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let hidden = self.hidden(point, normal);
         let shown = self.above_with(piece, half, hidden.clone(), None);
         let is_wall = |possible: f64, here: f64| possible > self.wall_over(here, half);
         let stands = |here: f64| here <= self.least || self.cut_away_below(&piece.foot, here).is_none();
-        if shown.is_some_and(|(possible, here, _)| !small || !is_wall(possible, here) && stands(here)) {
+        // None of the moves that cells show passes all of the square, though one cut its middle.
+        let stock = (self.stock_top - point.z) * normal.z;
+        let is_passed = |possible: f64, here: f64| possible < stock || here >= stock;
+        let is_enough = |possible: f64, here: f64| {
+            is_passed(possible, here) && (!small || !is_wall(possible, here) && stands(here))
+        };
+        if shown.is_some_and(|(possible, here, _)| is_enough(possible, here)) {
             return shown;
         }
         let lowest = self.lowest_of_all(piece, 0.0);
@@ -322,8 +330,14 @@ impl Patches<'_> {
         let mut low: Vec<(f64, u32)> = all.iter().filter_map(over).collect();
         let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if low.len() > MOST_LOW {
-            low.select_nth_unstable_by(MOST_LOW, order);
-            low.truncate(MOST_LOW);
+            // Of flats more may be equally low.
+            let lowest = low.iter().fold(f64::INFINITY, |lowest, (z, _)| lowest.min(*z));
+            let equal = low.iter().filter(|(z, _)| *z <= lowest + NUMERICAL_FLOOR).count();
+            let most = MOST_LOW.max(equal);
+            if most < low.len() {
+                low.select_nth_unstable_by(most, order);
+                low.truncate(most);
+            }
         }
         low.sort_unstable_by(order);
         let corners = piece.corners.iter().zip(&piece.leans).take(piece.len);
@@ -487,8 +501,7 @@ impl Patches<'_> {
         let level = |q: &Point2, z: f64| {
             (z - point.z) * normal.z + (q.x - point.x) * normal.x + (q.y - point.y) * normal.y
         };
-        let top = self.stock_over(&places[..count]);
-        let mut rows = vec![places.map(|q| level(&q, top))];
+        let mut rows = Vec::with_capacity(moves.len() + 1);
         for &by in moves {
             let mut row = [0.0; 2 * MOST_CORNERS];
             let passes = places[..count].iter().zip(&mut row).all(|(q, value)| {
@@ -501,7 +514,17 @@ impl Patches<'_> {
                 rows.push(row);
             }
         }
-        (least_greatest(&rows, count) + piece.below) / piece.cosine
+        let above = |rows: &[_]| (least_greatest(rows, count) + piece.below) / piece.cosine;
+        // Stock in a shape takes longer than all moves.
+        if self.inspection.surface.cut.shape.is_some() {
+            let by_moves = above(&rows);
+            if by_moves <= self.least {
+                return by_moves;
+            }
+        }
+        let top = self.stock_over(&places[..count]);
+        rows.push(places.map(|q| level(&q, top)));
+        above(&rows)
     }
 
     /// The stock is nowhere higher between some places, mm.
