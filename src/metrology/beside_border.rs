@@ -106,20 +106,22 @@ impl Inspection<'_> {
         if inside > far || (way - piece.inward * inside).norm() > NUMERICAL_FLOOR + piece.bend {
             return None;
         }
-        // Where the move does not pass all is left.
         let is_left = |share: f64, far: f64| {
             let place = piece.design(self.part, share).0 + piece.inward_by(share, far);
-            let cut = self.surface.envelope.height(by, place.x, place.y);
-            cut.is_none_or(|cut| place.z <= cut)
+            Some(place.z <= self.surface.envelope.height(by, place.x, place.y)?)
         };
-        if !is_left(share, far) {
-            return None;
-        }
-        let place = foot + piece.inward_by(share, least_way(far, |far| is_left(share, far)));
-        let here = (place - p).norm();
+        let here = match is_left(share, far) {
+            Some(false) => return None,
+            Some(true) => {
+                let left = |far: f64| is_left(share, far) == Some(true);
+                (foot + piece.inward_by(share, least_way(far, left)) - p).norm()
+            }
+            // As little as the border itself counts where a move does not pass beside it, as beside a vertical flank.
+            None => 0.0,
+        };
         let along = aside / (b - a).norm();
         let around = [share - along, share + along].map(|share| share.clamp(0.0, 1.0));
-        let holds = inside + aside <= far && around.iter().all(|share| is_left(*share, far));
+        let holds = inside + aside <= far && around.iter().all(|share| is_left(*share, far) != Some(false));
         Some(Value { here, possible: if holds { here + aside } else { f64::INFINITY } })
     }
 
@@ -192,6 +194,17 @@ mod tests {
             let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), std::slice::from_ref(&plunge), cell);
             let off = (found.max_depth_mm - truth).abs();
             assert!(off <= found.error_bound_mm && off < 5e-6, "{cell}: {truth} {found:?}");
+        }
+    }
+
+    /// The side of a flat end mill reaches over a border by less than the tolerance: nothing, on cells whose places lie on the border, too.
+    #[test]
+    fn a_vertical_side_over_a_border_counts_nothing_on_cells_of_every_size() {
+        let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
+        let plunge = [10.0, -0.05].map(|z| Point3::new(-2.999, 0.13, z)).to_vec();
+        for cell in CELLS {
+            let found = gouge_of(&part, &flat, std::slice::from_ref(&plunge), cell);
+            assert!(found.max_depth_mm < 1e-6 && found.regions.is_empty(), "{cell}: {found:?}");
         }
     }
 
