@@ -15,10 +15,11 @@ use std::collections::HashMap;
 
 use super::cut_surface::CutSurface;
 use super::facing::LEAST_FACING;
-use super::figures::{GougeFigures, GougeRegion, NUMERICAL_FLOOR};
-use super::inspection::Inspection;
+use super::figures::{GougeFigures, NUMERICAL_FLOOR};
+use super::inspection::{Inspection, Sample};
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3, share_on};
+use motion::Cutters;
 use part::{Part, PatchPoint};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -26,7 +27,7 @@ use work::monitor::{self, Cancelled, Monitor};
 const LONGEST_PIECE: f64 = 2.0;
 
 /// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
-const INSIDE_SHARE: f64 = 0.65;
+pub(super) const INSIDE_SHARE: f64 = 0.65;
 
 /// Halvings by which the way to what is left is found: to a ten-millionth of the farthest.
 const INSIDE_HALVINGS: usize = 24;
@@ -38,16 +39,16 @@ const STEPS: usize = 24;
 const MOST_HALVINGS: u32 = 20;
 
 /// A piece of the border that is straight, or nearly: on a patch the piece of a curve, its ends on it.
-struct BorderPiece {
-    ends: [Point3; 2],
+pub(super) struct BorderPiece {
+    pub ends: [Point3; 2],
     /// Parameters of the ends, on a patch.
     at: Option<[PatchPoint; 2]>,
     /// How far it leaves its chord at most, mm, as its middle tells.
-    bend: f64,
+    pub bend: f64,
     /// Of the triangle that it bounds.
     normal: Vector3,
     /// Unit vector along the triangle, square to the piece.
-    inward: Vector3,
+    pub inward: Vector3,
 }
 
 /// The deepest cut of a move along a border.
@@ -85,15 +86,26 @@ pub(super) fn design_along(
 
 impl BorderPiece {
     /// The design at a share of the piece, and its normal there.
-    fn design(&self, part: &Part, share: f64) -> (Point3, Vector3) {
+    pub fn design(&self, part: &Part, share: f64) -> (Point3, Vector3) {
         design_along(part, &self.ends, self.at, self.normal, share)
     }
 
     /// Whether a way down against the normal of a place leads out over the border.
-    fn leads_out(&self, normal: &Vector3) -> bool {
+    pub fn leads_out(&self, normal: &Vector3) -> bool {
         let along = self.ends[1] - self.ends[0];
         let across = Vector3::new(-along.y, along.x, 0.0);
         normal.dot(&across) * across.dot(&self.inward) > 0.0
+    }
+
+    /// As far from the end of the piece, where another border may begin, as from the border: as a share of it.
+    fn end(&self, far: f64) -> f64 {
+        (far / (self.ends[1] - self.ends[0]).norm()).min(0.5)
+    }
+
+    /// The way from a share of the piece to a place so far within all borders, mm.
+    pub fn inward_by(&self, share: f64, far: f64) -> Vector3 {
+        let end = self.end(far);
+        (self.ends[1] - self.ends[0]) * (share.clamp(end, 1.0 - end) - share) + self.inward * far
     }
 
     /// The piece is no nearer to a stretch of the plan, mm.
@@ -106,13 +118,13 @@ impl BorderPiece {
 }
 
 /// The borders of the triangles that face up.
-fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
-    let mesh = inspection.part.mesh();
-    let longest = LONGEST_PIECE * inspection.cutters.least(Cutter::radius);
+pub(super) fn pieces(part: &Part, cutters: &Cutters) -> Vec<BorderPiece> {
+    let mesh = part.mesh();
+    let longest = LONGEST_PIECE * cutters.least(Cutter::radius);
     let faces = |t: usize| mesh.normal(t).z > LEAST_FACING;
     let of_triangle = |t: usize| {
         let (normal, corners) = (mesh.normal(t), mesh.corners(t));
-        let parameters = inspection.part.corner_parameters(t);
+        let parameters = part.corner_parameters(t);
         let border = (0..3).filter(|&k| mesh.neighbour(t, k).is_none_or(|other| !faces(other)));
         let pieces = border.flat_map(|k| {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
@@ -126,12 +138,12 @@ fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
             let parts = ((b - a).norm() / longest).ceil().max(1.0) as usize;
             let piece = |k: usize| {
                 let [from, to] = [k, k + 1].map(|k| k as f64 / parts as f64);
-                let ends = [from, to].map(|share| whole.design(inspection.part, share).0);
+                let ends = [from, to].map(|share| whole.design(part, share).0);
                 let at = whole.at.map(|[a, b]| [from, to].map(|share| a.toward(&b, share)));
                 let straight = BorderPiece { ends, at, ..whole };
                 let middle = ends[0] + (ends[1] - ends[0]) * 0.5;
-                let off = (straight.design(inspection.part, 0.5).0 - middle).norm();
-                let bend = if at.is_some() { off.max(inspection.part.mesh_deviation()) } else { 0.0 };
+                let off = (straight.design(part, 0.5).0 - middle).norm();
+                let bend = if at.is_some() { off.max(part.mesh_deviation()) } else { 0.0 };
                 BorderPiece { bend, ..straight }
             };
             let has_length = whole.inward.norm_squared() > 0.0;
@@ -219,9 +231,15 @@ impl Inspection<'_> {
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
-    pub fn cut_borders(&self, gouge: &mut GougeFigures, monitor: &dyn Monitor) -> Result<(), Cancelled> {
-        let pieces = pieces(self);
-        let nearby = Nearby::new(&pieces, self.cutters.greatest_radius());
+    pub fn cut_borders(
+        &self,
+        samples: &[Sample],
+        gouge: &mut GougeFigures,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Cancelled> {
+        let Some(borders) = self.borders else { return Ok(()) };
+        let pieces = &borders.pieces;
+        let nearby = Nearby::new(pieces, self.cutters.greatest_radius());
         let path = self.surface.path;
         let known = gouge.max_depth_mm;
         let cuts = work::parallel::try_map(path.len(), |k| {
@@ -246,14 +264,7 @@ impl Inspection<'_> {
         if cut.depth > gouge.max_depth_mm {
             gouge.max_depth_mm = cut.depth;
             if cut.depth > self.limits.gouge {
-                let region = GougeRegion {
-                    depth_mm: cut.depth,
-                    at_mm: cut.at.into(),
-                    move_index: cut.by,
-                    ..GougeRegion::default()
-                };
-                gouge.regions.insert(0, region);
-                gouge.region_count += 1;
+                self.list_gouge(samples, gouge, (cut.depth, cut.at, cut.by));
             }
         }
         gouge.error_bound_mm = most - gouge.max_depth_mm;
@@ -265,12 +276,8 @@ impl Inspection<'_> {
         let design = |share: f64| piece.design(self.part, share);
         let length = (piece.ends[1] - piece.ends[0]).norm();
         let far = INSIDE_SHARE * self.limits.gouge;
-        // As far from the end of the piece, where another border may begin, as from the border.
-        let end = |far: f64| (far / length).min(0.5);
-        let inward = |share: f64, far: f64| {
-            let end = end(far);
-            (piece.ends[1] - piece.ends[0]) * (share.clamp(end, 1.0 - end) - share) + piece.inward * far
-        };
+        let end = |far: f64| piece.end(far);
+        let inward = |share: f64, far: f64| piece.inward_by(share, far);
         let inside = |share: f64, far: f64| {
             let nearby = design(share).0 + inward(share, far);
             Some(nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?)
@@ -309,6 +316,12 @@ impl Inspection<'_> {
             let Some(PlaceDepth { mut along, inside }) = found else { return (most, None) };
             if inside <= 0.0 && along > most {
                 along = along.min(near(share));
+            }
+            if along > most && along.is_finite() {
+                let (place, normal) = design(share);
+                // Within the part, which ends there.
+                let place = place + inward(share, NUMERICAL_FLOOR);
+                along = self.counted(&place, &normal, along, by).map_or(along, |counted| counted.min(along));
             }
             let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
             let depth = ridge.map_or(along, |cut| -cut.distance);
@@ -386,7 +399,7 @@ fn concave_most([a, m, b]: [f64; 3]) -> f64 {
 }
 
 /// The least way up to `far`, nearly, from which on a place is left, as it is at `far`.
-fn least_way(far: f64, is_left: impl Fn(f64) -> bool) -> f64 {
+pub(super) fn least_way(far: f64, is_left: impl Fn(f64) -> bool) -> f64 {
     let (mut cut, mut left) = (0.0, far);
     for _ in 0..INSIDE_HALVINGS {
         let middle = 0.5 * (cut + left);

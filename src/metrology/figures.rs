@@ -115,7 +115,8 @@ pub struct ScallopFigures {
 pub struct GougeRegion {
     /// Greatest depth.
     pub depth_mm: f64,
-    /// Area on the design surface; 0 between the centres of cells.
+    /// Area on the design surface; 0, and not written, where no centre of a cell is so deep.
+    #[serde(skip_serializing_if = "is_zero")]
     pub area_mm2: f64,
     /// Where the greatest depth is.
     pub at_mm: [f64; 3],

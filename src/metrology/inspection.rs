@@ -4,6 +4,7 @@
 //! or below every cell centre, and the figures of what lies below and above the design, each with the
 //! bound of its error. mm.
 
+use super::beside_border::Borders;
 use super::closer::{Promising, Square, Value};
 use super::creases::Creases;
 use super::cut_surface::{CutSurface, Deviation};
@@ -90,6 +91,8 @@ pub(super) struct Inspection<'a> {
     pub steepest: f64,
     /// The creases of the part, where gouges are sought between the centres of cells.
     pub creases: Option<&'a Creases>,
+    /// The borders of the part, where cuts beside them are measured.
+    pub borders: Option<&'a Borders>,
     /// The walls beside, where they are measured.
     pub walls: Option<&'a Walls>,
     /// All moves, where heights that one of them cuts away are no figures though it won no cell.
@@ -309,21 +312,28 @@ impl Inspection<'_> {
     pub fn gouges(&self, samples: &[Sample], monitor: &dyn Monitor) -> Result<GougeFigures, Cancelled> {
         let deep = |k: usize| f64::from(samples[k].deviation) < -self.limits.gouge;
         let mut figures = GougeFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
-        let regions = connected(&self.grid, &deep);
-        for region in &regions {
-            let area: f64 = region.iter().map(|&k| self.area(k as usize, &samples[k as usize])).sum();
-            figures.area_mm2 += area;
-            let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { continue };
-            let (depth, at, by) = self.deepest_near(deepest as usize);
+        let mut regions = connected(&self.grid, &deep);
+        regions.retain(|region| {
+            let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { return false };
+            let (depth_mm, at, move_index) = self.deepest_near(deepest as usize);
+            // Beside a border a cut may count less deep than along the normal.
+            if depth_mm <= self.limits.gouge {
+                return false;
+            }
+            let area_mm2 = region.iter().map(|&k| self.area(k as usize, &samples[k as usize])).sum();
+            figures.area_mm2 += area_mm2;
             figures.regions.push(GougeRegion {
-                depth_mm: depth,
-                area_mm2: area,
+                depth_mm,
+                area_mm2,
                 at_mm: at.into(),
-                move_index: by,
+                move_index,
                 ..GougeRegion::default()
             });
-        }
-        let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
+            true
+        });
+        let deepest = measured(samples).filter(|(_, d)| *d < 0.0).min_by(|a, b| a.1.total_cmp(&b.1));
+        let deepest =
+            deepest.and_then(|(k, d)| Some(self.depth_at(self.centre(k))?.0.min(-d))).unwrap_or(0.0);
         let listed = figures.regions.iter().map(|r| r.depth_mm).fold(0.0, f64::max);
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
@@ -333,22 +343,14 @@ impl Inspection<'_> {
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.at_least_mm = (figures.max_depth_mm - NUMERICAL_FLOOR).max(0.0);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
-        if let Some((depth, q)) = found.greatest.filter(|(depth, _)| *depth > self.limits.gouge) {
-            let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
-            let of_cells = cell.and_then(|cell| regions.iter().position(|region| region.contains(&cell)));
-            let k = of_cells.unwrap_or_else(|| {
-                // Between the centres of cells, none of which is so deep.
-                figures.regions.push(GougeRegion::default());
-                figures.regions.len() - 1
-            });
-            if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k))
-            {
-                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..region.clone() };
-            }
-        }
         figures.region_count = figures.regions.len();
         figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
         figures.regions.truncate(LISTED_REGIONS);
+        if let Some((depth, q)) = found.greatest.filter(|(depth, _)| *depth > self.limits.gouge)
+            && let Some((_, at, by)) = self.depth_at(q)
+        {
+            self.list_gouge(samples, &mut figures, (depth, at, by));
+        }
         Ok(figures)
     }
 
@@ -373,7 +375,17 @@ impl Inspection<'_> {
         let is_own = |lean: f64| lean >= self.steepest;
         let on = |point: &Point3, normal: &Vector3, half: f64| {
             let (d, _) = self.along_normal(point, normal).filter(|_| is_own(normal.z))?;
-            Some((point.xy(), value(&d, normal.z, half)))
+            let found = value(&d, normal.z, half);
+            let counted = if found.here > known && d.distance < 0.0 {
+                self.beside_border(point, normal, &d, &[], reach(half, normal.z))
+            } else {
+                None
+            };
+            let counted = counted.map_or(found, |counted| Value {
+                here: counted.here,
+                possible: counted.possible.min(found.possible),
+            });
+            Some((point.xy(), counted))
         };
         let at = |q: Point2, half: f64| {
             let centre = self.design_at(q).and_then(|design| on(&design.point, &design.normal, half));
@@ -418,7 +430,8 @@ impl Inspection<'_> {
     fn depth_with(&self, q: Point2, further: &[u32]) -> Option<(f64, Point3, u32)> {
         let design = self.design_at(q)?;
         let (d, _) = self.along_normal_with(&design.point, &design.normal, further)?;
-        Some((-d.distance, design.point, d.by))
+        let counted = self.beside_border(&design.point, &design.normal, &d, further, 0.0);
+        Some((counted.map_or(-d.distance, |counted| counted.here), design.point, d.by))
     }
 
     /// Raises the deepest gouge to that of moves which stand deeper in the design than the cells show: they may be lowest at no centre, or
@@ -461,29 +474,40 @@ impl Inspection<'_> {
         Ok(left)
     }
 
-    /// Lists a gouge with its depth, place and move: as the deepest of the cells' own region there, or as one that no centre saw.
-    fn list_gouge(&self, samples: &[Sample], gouge: &mut GougeFigures, found: (f64, Point3, u32)) {
-        let (depth_mm, at, move_index) = found;
-        let cell_of = |at: &Point3| self.grid.cell_at(at.x, at.y).map(|(i, j)| self.grid.index(i, j) as u32);
-        let own = cell_of(&at);
-        let all = connected(&self.grid, &|k| f64::from(samples[k].deviation) < -self.limits.gouge);
-        let of_cells = all.iter().find(|region| own.is_some_and(|cell| region.contains(&cell)));
-        let holds = |listed: &&mut GougeRegion| {
-            let cell = cell_of(&listed.at_mm.into());
-            of_cells.is_some_and(|region| cell.is_some_and(|cell| region.contains(&cell)))
+    /// Lists a gouge with its depth, place and move: as the deepest of the region of cells there, or beside it, or as one that no centre saw.
+    pub(super) fn list_gouge(
+        &self,
+        samples: &[Sample],
+        gouge: &mut GougeFigures,
+        (depth_mm, at, move_index): (f64, Point3, u32),
+    ) {
+        let cell_of = |at: &[f64; 3]| self.grid.cell_at(at[0], at[1]);
+        let own = cell_of(&at.into());
+        let beside = |a: (usize, usize), b: (usize, usize)| a.0.abs_diff(b.0) <= 1 && a.1.abs_diff(b.1) <= 1;
+        let is_deep = |k: usize| f64::from(samples[k].deviation) < -self.limits.gouge;
+        let all = connected(&self.grid, &is_deep);
+        let touches = |region: &Vec<u32>, cell: (usize, usize)| {
+            let (i, j) = cell;
+            let rows = j.saturating_sub(1)..=(j + 1).min(self.grid.ny - 1);
+            let columns = i.saturating_sub(1)..=(i + 1).min(self.grid.nx - 1);
+            let mut around = rows.flat_map(|j| columns.clone().map(move |i| (i, j)));
+            around.any(|(i, j)| region.contains(&(self.grid.index(i, j) as u32)))
         };
-        match gouge.regions.iter_mut().find(holds) {
-            Some(listed) => {
-                *listed = GougeRegion { depth_mm, at_mm: at.into(), move_index, ..listed.clone() };
+        // What was listed of the same region lies in its cells or beside them, or beside this place.
+        let of_cells = own.and_then(|own| all.iter().find(|region| touches(region, own)));
+        let is_same = |listed: &&mut GougeRegion| {
+            let (Some(own), Some(cell)) = (own, cell_of(&listed.at_mm)) else { return false };
+            beside(own, cell) || of_cells.is_some_and(|region| touches(region, cell))
+        };
+        let region = GougeRegion { depth_mm, at_mm: at.into(), move_index, ..GougeRegion::default() };
+        match gouge.regions.iter_mut().find(is_same) {
+            Some(listed) if listed.depth_mm < depth_mm => {
+                *listed = GougeRegion { area_mm2: listed.area_mm2, ..region };
             }
+            Some(_) => {}
             None => {
                 gouge.region_count += 1;
-                gouge.regions.push(GougeRegion {
-                    depth_mm,
-                    at_mm: at.into(),
-                    move_index,
-                    ..GougeRegion::default()
-                });
+                gouge.regions.push(region);
             }
         }
         gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));

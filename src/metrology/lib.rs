@@ -23,6 +23,7 @@
 
 mod along_normals;
 mod beneath;
+mod beside_border;
 mod border_cuts;
 mod closer;
 mod contact;

@@ -1,5 +1,6 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
+use super::beside_border::Borders;
 use super::coverage::STEEP;
 use super::creases::Creases;
 use super::cut_surface::CutSurface;
@@ -81,6 +82,7 @@ pub(crate) fn measure_with_walls(
     around.max.z = around.max.z.max(asked.stock_top);
     let every_move = EveryMove::new(&surface, cutters, &around);
     let creases = Creases::new(part);
+    let edges = asked.border_cuts.then(|| Borders::new(part, cutters));
     let inspection = Inspection {
         part,
         cutters,
@@ -92,6 +94,7 @@ pub(crate) fn measure_with_walls(
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         creases: Some(&creases),
+        borders: edges.as_ref(),
         walls: walls.as_ref(),
         steepest: if asked.steep_elsewhere { STEEP } else { LEAST_FACING },
         every_move: Some(&every_move),
@@ -119,9 +122,7 @@ pub(crate) fn measure_with_walls(
     let hiding = inspection.raise_by_moves(path, &found.samples, &mut measured.gouge, monitor)?;
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
-    if asked.border_cuts {
-        inspection.cut_borders(&mut measured.gouge, monitor)?;
-    }
+    inspection.cut_borders(&found.samples, &mut measured.gouge, monitor)?;
     let was_doubted = doubt(&mut measured, part, &every_move, bound);
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top };
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;

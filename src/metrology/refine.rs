@@ -138,7 +138,7 @@ impl Refinement<'_> {
     /// True where a rectangle of cells of `cell` mm (0 before it is cut) may hold more than is known.
     fn open(&self, suspicion: &Suspicion, greatest: &GreatestSoFar, cell: f64) -> bool {
         let asked = self.asked.error_bound;
-        let seen = cell > 0.0 && most_unseen(self.coarse.cutters, cell, 1.0) <= asked;
+        let seen = cell > 0.0 && most_unseen(self.coarse.cutters, cell) <= asked;
         let depth = if seen { suspicion.depth } else { suspicion.deeper };
         suspicion.height > greatest.height.max(self.coarse.limits.uncut) + asked
             || depth > greatest.depth + asked
@@ -217,7 +217,7 @@ impl Refinement<'_> {
             };
             rest.height = hidden;
             // What these cells may have missed in turn.
-            let missed = most_unseen(self.coarse.cutters, cell, 1.0);
+            let missed = most_unseen(self.coarse.cutters, cell);
             rest.deeper = rest.deeper.min(found.gouge.max_depth_mm + found.gouge.error_bound_mm + missed);
             last = Some(found);
             if !self.open(&rest, &now, cell) {

@@ -144,6 +144,7 @@ fn on_cells<'a>(
         grid,
         steepest: STEEP,
         creases: None,
+        borders: None,
         walls: None,
         every_move: None,
     }

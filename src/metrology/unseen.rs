@@ -31,19 +31,18 @@ const SAME_NORMAL: f64 = 1e-4;
 /// A contact counts when it lies beside its foot along the normal to this share: not beyond the border.
 const BESIDE: f64 = 0.1;
 
-/// How deep the cutter may dip into a surface between centres `cell` mm apart and none of them be in the
-/// dip: w²/8r for a corner of radius r, w the diagonal of a cell along a surface whose
-/// normal has the vertical part `lean`. Edges and points may be as deep as half of w.
-fn unseen_depth(cutter: &Cutter, cell: f64, lean: f64) -> f64 {
-    let (width, corner) = (cell * std::f64::consts::SQRT_2 / lean, cutter.corner_radius());
+/// How deep the cutter may dip into a level surface between centres `cell` mm apart and none of them be in the
+/// dip: w²/8r for a corner of radius r, w the diagonal of a cell. Edges and points may be as deep as half of w.
+fn unseen_depth(cutter: &Cutter, cell: f64) -> f64 {
+    let (width, corner) = (cell * std::f64::consts::SQRT_2, cutter.corner_radius());
     let rounded = corner > 0.0 && cutter.profile().is_plain();
     let arc = if rounded { width * width / (8.0 * corner) } else { f64::INFINITY };
     arc.min(0.5 * width)
 }
 
 /// The greatest [`unseen_depth`] of some cutters.
-pub(super) fn most_unseen(cutters: &Cutters, cell: f64, lean: f64) -> f64 {
-    cutters.greatest(|cutter| unseen_depth(cutter, cell, lean))
+pub(super) fn most_unseen(cutters: &Cutters, cell: f64) -> f64 {
+    cutters.greatest(|cutter| unseen_depth(cutter, cell))
 }
 
 /// A place where the cutter stands in the design.
@@ -238,10 +237,10 @@ mod tests {
     #[test]
     fn a_dip_of_the_unseen_depth_is_as_wide_as_a_cell() {
         let cutter = Cutter::ball(6.0).unwrap();
-        let depth = unseen_depth(&cutter, 0.1, 0.5);
+        let depth = unseen_depth(&cutter, 0.2);
         // Half the chord of a circle at that depth.
         let half = (9.0 - (3.0 - depth).powi(2)).sqrt();
-        assert!((2.0 * half / (0.1 * 2f64.sqrt() / 0.5) - 1.0).abs() < 1e-3, "{half}");
-        assert!(unseen_depth(&Cutter::flat(6.0).unwrap(), 0.1, 0.7) > 0.1);
+        assert!((2.0 * half / (0.2 * 2f64.sqrt()) - 1.0).abs() < 1e-3, "{half}");
+        assert!(unseen_depth(&Cutter::flat(6.0).unwrap(), 0.15) > 0.1);
     }
 }
