@@ -116,6 +116,23 @@ pub(super) struct Effort {
     pub places: usize,
     /// Squares that are held at a time, [`BYTES_PER_SQUARE`] each.
     pub squares: usize,
+    /// The search ends where it can bring the bound neither to this, mm, nor to what was asked: nothing is decided by a higher one. Infinite
+    /// where each bound is of use.
+    pub useful: f64,
+}
+
+impl Effort {
+    /// So many places and squares for a value of which each bound is of use.
+    pub fn whole(places: usize, squares: usize) -> Self {
+        Self { places, squares, useful: f64::INFINITY }
+    }
+
+    /// Whether no bound below `least`, mm, comes of the places that are left after `spent` ones: each square that promises more has to be
+    /// divided once at least.
+    fn is_in_vain(&self, open: &BinaryHeap<Square>, least: f64, spent: usize) -> bool {
+        let promising = || open.iter().filter(|square| square.possible > least).count();
+        self.useful.is_finite() && 4 * promising() > self.places - spent
+    }
 }
 
 /// Bytes that a square takes while its list grows.
@@ -176,7 +193,7 @@ pub(super) fn greatest(
         let found = at(centre, half).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, &|_| asked, Effort { places: MOST, squares: held }, &inside, &|_, _| true, monitor)
+    search(squares, known, &|_| asked, Effort::whole(MOST, held), &inside, &|_, _| true, monitor)
 }
 
 /// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside` tells what the square around a
@@ -197,6 +214,9 @@ pub(super) fn search(
         let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked(best).max(NUMERICAL_FLOOR) };
         // What is divided no more keeps the bound as wide, however low the rest is.
         let least = if spent < CHEAP { best + enough } else { undivided.max(best + enough) };
+        if spent >= CHEAP && most.is_in_vain(&open, least.max(most.useful), spent) {
+            break;
+        }
         let mut batch = Vec::with_capacity(BATCH);
         while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > least) {
             match open.pop() {
@@ -286,6 +306,42 @@ mod tests {
         let hill = |p: Point2| Some((1.0 - 0.1 * (p.x - 2.0).powi(2), 0.2 * (p.x - 2.0).abs()));
         let found = search(4, 5.0, 1e-3, &hill);
         assert_eq!(found, BoundedGreatest { greatest: None, possible: 5.0 });
+    }
+
+    /// A plateau whose squares promise more than it is high however small they are. The search cannot close its bound, and ends early where
+    /// so high a bound is of no use. A crest is told as ever.
+    #[test]
+    fn a_search_in_vain_ends_where_its_bound_is_of_no_use() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let run = |n: u32, useful: f64, f: &(dyn Fn(Point2, f64) -> Value + Sync)| {
+            let asked = AtomicUsize::new(0);
+            let at = |centre: Point2, half: f64| {
+                asked.fetch_add(1, Ordering::Relaxed);
+                Some((centre, f(centre, half)))
+            };
+            let centres = (0..n * n).map(|k| Point2::new(f64::from(k % n) + 0.5, f64::from(k / n) + 0.5));
+            let squares =
+                centres.map(|centre| Square { possible: f(centre, 0.5).possible, centre, half: 0.5 });
+            let most = Effort { useful, ..Effort::whole(400_000, usize::MAX) };
+            let found =
+                super::search(squares.collect(), 0.0, &|_| 1e-4, most, &at, &|_, _| true, &Silent).unwrap();
+            (found, asked.into_inner())
+        };
+        let plateau = |_: Point2, half: f64| Value { here: 1.0, possible: 2.5 + half };
+        let (whole, all) = run(20, f64::INFINITY, &plateau);
+        for useful in [0.0, 2.0] {
+            let (short, few) = run(20, useful, &plateau);
+            assert_eq!(short.greatest, whole.greatest);
+            assert!(short.possible >= whole.possible && short.possible < 2.6, "{short:?} {whole:?}");
+            assert!(few < all / 3, "{useful}: {all} {few}");
+        }
+        // Nothing promises more than this.
+        assert_eq!(run(20, 3.0, &plateau), (whole, all));
+        let crest = |p: Point2, half: f64| {
+            let here = 2.0 - 0.3 * (p.x - 0.61 * p.y - 1.07).abs();
+            Value { here, possible: here + 0.3 * 1.62 * half }
+        };
+        assert_eq!(run(8, 0.0, &crest), run(8, f64::INFINITY, &crest));
     }
 
     #[test]

@@ -110,8 +110,10 @@ impl ExcessSearch<'_> {
             self.open(samples, [known.max_mm.min(limits.scallop), closer_above], &|_| true, monitor)?;
         // Moves that no cell saw, as they are found.
         let unseen = RwLock::default();
-        let sought = |known, kind| self.highest(&open, known, kind, &unseen, monitor);
-        let highest = sought(known, Kind::Any)?;
+        // Uncut material stands above its limit for certain, so that no bound changes the verdict.
+        let fails = |unreached: &Bounded| unreached.at_least_mm > limits.uncut;
+        let sought = |known, kind, fails| self.highest(&open, known, kind, fails, &unseen, monitor);
+        let highest = sought(known, Kind::Any, fails(&region))?;
         monitor::check(monitor)?;
         let (reached, unreached) = if highest.at_most() <= limits.scallop {
             // Whatever it is, it holds every limit.
@@ -120,14 +122,15 @@ impl ExcessSearch<'_> {
             // Below its limit it is of no account.
             let floor = limits.uncut - self.inspection.asked.max(2.0 * NUMERICAL_FLOOR);
             let unreached = Bounded { max_mm: region.max_mm.max(floor), ..region };
-            let found = sought(unreached, Kind::Unreached)?;
+            let found = sought(unreached, Kind::Unreached, fails(&region))?;
             monitor::check(monitor)?;
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
             // Nothing at all is higher than a ridge, which passes reached, or than another place that they did.
             let is_known = highest.max_mm <= ridge.max_mm || self.is_reached(&highest);
-            (if is_known { highest } else { sought(ridge, Kind::Reached)? }, unreached)
+            let reached = if is_known { highest } else { sought(ridge, Kind::Reached, fails(&unreached))? };
+            (reached, unreached)
         };
         // Moves that no cell saw came up only after the first search.
         let highest = if reached.max_mm > highest.max_mm { highest.or(&reached) } else { highest };
@@ -343,12 +346,13 @@ impl ExcessSearch<'_> {
     }
 
     /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut away what seemed to be
-    /// the highest are added to those that no cell saw.
+    /// the highest are added to those that no cell saw. Where the part `fails` whatever is found, a bound that can decide no limit stays wide.
     fn highest(
         &self,
         open: &Promising,
         known: Bounded,
         kind: Kind,
+        fails: bool,
         unseen: &RwLock<Vec<u32>>,
         monitor: &dyn Monitor,
     ) -> Result<Bounded, Cancelled> {
@@ -384,7 +388,13 @@ impl ExcessSearch<'_> {
             }
         };
         let squares = open.squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
-        let most = Effort { places: self.most_places(), squares: self.inspection.most_squares };
+        let whole = Effort::whole(self.most_places(), self.inspection.most_squares);
+        let useful = match kind {
+            _ if !fails || self.inspection.is_first_look => f64::INFINITY,
+            Kind::Reached => self.inspection.limits.scallop,
+            Kind::Any | Kind::Unreached => 0.0,
+        };
+        let most = Effort { useful, ..whole };
         let stands = |q: Point2, height: f64| match self.cut_away_below([q.x, q.y], height) {
             None => !self.is_foil(q, height),
             Some(by) => {

@@ -215,6 +215,24 @@ fn few_squares_are_enough_where_all_ridges_hold() {
     assert!(found.max_mm > 0.0094 && found.at_most() < LIMITS.scallop, "{found:?}");
 }
 
+/// Passes over half of a part. What stands on the other half fails for certain, and its bound holds; so does that of what the passes left.
+#[test]
+fn what_no_pass_came_to_is_higher_than_its_limit_for_certain() {
+    let cutter = Cutter::ball(6.0).unwrap();
+    for shape in [2, 4, 5] {
+        let part = part(shape);
+        let Toolpath { start, mut moves, .. } = path(&part, &cutter, 0.0, 0.4, 0.0);
+        moves.retain(|m| m.to.tip.y < 0.4 * SIDE);
+        let path = Toolpath::new(start, moves);
+        let found = measured(&part, &cutter, &path, 0.05).excess;
+        let brute = Brute::new(&part, &cutter, &path);
+        let truth = brute.highest(80);
+        assert!(found.unreached.at_least_mm > LIMITS.uncut, "{shape}: {truth} {found:?}");
+        let all = found.reached.at_most().max(found.unreached.at_most());
+        assert!(all >= truth - 1e-9 && found.highest.at_most() >= truth - 1e-9, "{shape}: {truth} {found:?}");
+    }
+}
+
 /// A ridge whose foot along the normal lies beyond the border is none of the part's.
 #[test]
 fn what_leans_over_the_border_from_beyond_does_not_count() {
