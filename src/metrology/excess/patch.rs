@@ -22,6 +22,9 @@ const MOST_MOVES: usize = 5;
 /// Moves that are followed along a path to the lowest one. Cells show one of so many short ones.
 const MOST_BESIDE: usize = 16;
 
+/// Heights that differ by less, mm, are one level.
+const LEVEL: f64 = 1e-9;
+
 /// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of thousands of squares.
 const MOST_ASKED: usize = 4096;
 
@@ -125,6 +128,8 @@ impl Patches<'_> {
                     return Held::Unknown;
                 };
                 let place = piece.foot.point.xy();
+                // Where facets meet in a square, no line cuts off what a wall accounts for.
+                let here = self.inspection.walls.map_or(here, |walls| walls.beside(&piece.foot.point, here));
                 held = Some(match held {
                     None => (possible, place, here, by),
                     Some((most, at, highest, its)) => {
@@ -286,7 +291,7 @@ impl Patches<'_> {
         let shown = self.above_with(piece, half, hidden.clone(), None);
         let is_wall = |possible: f64, here: f64| possible > self.wall_over(here, half);
         let stands = |here: f64| here <= self.least || self.cut_away_below(&piece.foot, here).is_none();
-        if shown.is_some_and(|(possible, here, _)| !small || !is_wall(possible, here) && stands(here)) {
+        if shown.is_some_and(|(possible, here, _)| stands(here) && !(small && is_wall(possible, here))) {
             return shown;
         }
         let lowest = self.lowest_of_all(piece, 0.0);
@@ -372,8 +377,15 @@ impl Patches<'_> {
         }
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
-        let free = self.by_moves(piece, known, here.by, &hidden, all);
-        let is_wall = free.is_none_or(|possible| possible > self.wall_over(here.distance, half));
+        let mut free = self.by_moves(piece, known, here.by, &hidden, all);
+        let is_wall = |free: Option<f64>| free.is_none_or(|p| p > self.wall_over(here.distance, half));
+        if is_wall(free)
+            && let Some(nearest) = self.nearest_of_lowest(&(point + normal * known))
+        {
+            hidden.to_mut().push(nearest);
+            free = self.by_moves(piece, known, here.by, &hidden, all);
+        }
+        let is_wall = is_wall(free);
         let wall = if is_wall { self.beside_wall(piece, half, known, &hidden, all) } else { None };
         let possible = [free, wall].into_iter().flatten().reduce(f64::min)?;
         Some((possible.max(known), here.distance, here.by))
@@ -457,6 +469,38 @@ impl Patches<'_> {
         found
     }
 
+    /// Of all moves that are lowest over a point the one whose axis is nearest in the plan; `None` where there are too many to ask. Of many
+    /// short moves on one level, the first that came over the centre of a cell may end beside it.
+    fn nearest_of_lowest(&self, point: &Point3) -> Option<u32> {
+        let envelope = &self.inspection.surface.envelope;
+        let all = self.inspection.every_move?.over(point.xy());
+        if all.len() > MOST_ASKED {
+            return None;
+        }
+        let mut best: Option<(f64, f64, u32)> = None;
+        for &by in all {
+            let Some(z) = envelope.height(by, point.x, point.y).filter(|z| *z < self.stock_top) else {
+                continue;
+            };
+            let least = best.map_or(f64::INFINITY, |best| best.0);
+            if z > least + LEVEL {
+                continue;
+            }
+            let off = self.off(by, point);
+            if z < least - LEVEL || best.is_none_or(|best| off < best.1) {
+                best = Some((z, off, by));
+            }
+        }
+        best.map(|best| best.2)
+    }
+
+    /// How far a point is from the axis of a move in the plan, mm.
+    fn off(&self, by: u32, point: &Point3) -> f64 {
+        let path = self.inspection.surface.path;
+        let ends = [path.start_of(by as usize), path.moves[by as usize].to.tip].map(|tip| tip.xy());
+        geometry::distance_to_segment(&point.xy(), &ends[0], &ends[1])
+    }
+
     /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
     fn moves(&self, point: &Point3, first: u32, hidden: &[u32]) -> Vec<u32> {
         let surface = self.inspection.surface;
@@ -469,6 +513,13 @@ impl Patches<'_> {
             all.filter_map(|by| Some((surface.envelope.height(by, point.x, point.y)?, by))).collect();
         low.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         low.dedup_by_key(|m| m.1);
+        if low.get(MOST_MOVES).is_some_and(|next| next.0 <= low[0].0 + LEVEL) {
+            // Of moves on one level the nearest pass most of a square.
+            let level = low.iter().take_while(|m| m.0 <= low[0].0 + LEVEL).count();
+            low.truncate(level);
+            let off = |m: &(f64, u32)| self.off(m.1, point);
+            low.sort_by(|a, b| off(a).total_cmp(&off(b)).then(a.1.cmp(&b.1)));
+        }
         low.truncate(MOST_MOVES);
         low.into_iter().map(|m| m.1).collect()
     }

@@ -335,3 +335,39 @@ fn a_drilled_hole_holds_no_more_than_its_corners() {
         assert!(excess.highest.at_most() < corner + 2e-3, "{facets} {cell} {excess:?} {corner}");
     }
 }
+/// A ring with a floor at z = 1 before a round wall whose corners lie 4 mm from the axis, inside of it (a pocket) or outside (a boss). A flat
+/// of 2 mm follows the true circle and leaves `thick` on it.
+fn round_wall(facets: usize, is_pocket: bool, thick: f64) -> (Part, Cutter, Toolpath) {
+    const SIDES: usize = 2000;
+    let (tool, hole, wall, out, floor) = (1.0, 1.0, 4.0, 7.0, 1.0);
+    let at = wall * (std::f64::consts::PI / facets as f64).cos();
+    let [inner, outer] = if is_pocket { [floor, HEIGHT] } else { [HEIGHT, floor] };
+    let section = [[hole, 0.0], [out, 0.0], [out, outer], [at, outer], [at, inner], [hole, inner]];
+    let part = turned(facets, &section);
+    let side = if is_pocket { -1.0 } else { 1.0 };
+    let last = wall + side * (tool + thick);
+    let rings = [last + side * 2.6, last + side * 1.3, last];
+    let rings = rings.into_iter().filter(move |r| *r > 0.0);
+    let floors = rings.flat_map(move |r| once_around(SIDES, r, floor));
+    let drilled = [20.0, -0.5, 20.0].map(|z| Point3::new(0.0, 0.0, z));
+    let path = faced(out + 2.0).chain(once_around(facets, out + tool, 0.0)).chain(floors).chain(drilled);
+    (part, Cutter::flat(2.0 * tool).unwrap(), path_through(path))
+}
+
+/// A cutter that follows a circle leaves what the circle is off the facets, and what it keeps off the circle.
+#[test]
+fn what_is_left_on_a_round_wall_is_as_high_as_it_is_thick() {
+    for (facets, cell) in [(120, 0.1), (400, 0.05)] {
+        let sagitta = 4.0 * (1.0 - (std::f64::consts::PI / facets as f64).cos());
+        for (is_pocket, thick) in [(true, 0.0), (true, 0.001), (true, 0.03), (false, 0.0), (false, 0.01)] {
+            let (part, cutter, path) = round_wall(facets, is_pocket, thick);
+            let Measurement { uncut, excess, gouge, .. } = measured_on(cell, &part, &cutter, &path);
+            let [left, cut] = if is_pocket { [thick, sagitta - thick] } else { [thick + sagitta, -thick] };
+            let told = format!("{facets} {is_pocket} {thick} {uncut:?} {excess:?} {gouge:?}");
+            assert!(uncut.region_count == 0, "{told}");
+            assert!((excess.highest.max_mm - left).abs() < 2e-3, "{left} {told}");
+            assert!(excess.highest.at_most() < left + 3e-3, "{left} {told}");
+            assert!((gouge.max_depth_mm - cut.max(0.0)).abs() < 2e-3, "{cut} {told}");
+        }
+    }
+}
