@@ -136,9 +136,18 @@ impl WallPiece {
         let sides = [(0, -self.beyond[0] - ahead), (1, self.length + self.beyond[1] + ahead)];
         let level = self.middle().0.z;
         for (side, u) in sides {
-            let is_solid = |aside: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
+            let end = [0.0, self.length][side];
+            let rise = (self.top[1] - self.top[0]) / self.length;
+            let top = self.top[side] + rise * (u - end);
+            // A cut from the top leads out over a lower one beyond the end; tops that fall no more than a slope does are the same one.
+            let behind = |aside: f64| level.max(top - STEEPEST * (ahead + aside));
+            let is_solid =
+                |aside: f64, level: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
             // Behind a convex edge material begins aside, before a concave one it ends there.
-            let slopes = [medial(ahead, &|aside| !is_solid(-aside)), medial(ahead, &|aside| is_solid(aside))];
+            let slopes = [
+                medial(ahead, &|aside| !is_solid(-aside, behind(aside))),
+                medial(ahead, &|aside| is_solid(aside, level)),
+            ];
             [self.behind[side], self.before[side]] = slopes;
         }
         self

@@ -6,6 +6,7 @@
 
 use geometry::{Point2, Vector2};
 
+use super::NUMERICAL_FLOOR;
 use super::piece::{QUARTERS, WallPiece};
 use super::reach::{Line, Moves, greatest, stadium};
 
@@ -17,6 +18,9 @@ const MOST_DEPTH: u32 = 24;
 
 /// Less is rounding, mm.
 const FLOOR: f64 = 1e-7;
+
+/// A cutter that comes no farther into a line along a wall than this only touches it, mm.
+const TOUCH: f64 = NUMERICAL_FLOOR;
 
 /// A strip's deepest cut.
 #[derive(Debug, Clone, Copy, Default)]
@@ -49,7 +53,9 @@ pub(super) fn deepest(piece: &WallPiece, moves: &Moves<'_>, near: &[u32]) -> Dee
         }
         let [a, b] = moves.ends(k);
         let tip = a.z.min(b.z) + FLOOR;
-        let Some(range) = stadium(&a.xy(), &b.xy(), moves.radius(k), piece.start, piece.along) else {
+        // A touch is no cut: beside the end of a strip it would be one of any depth.
+        let inside = moves.radius(k) - TOUCH;
+        let Some(range) = stadium(&a.xy(), &b.xy(), inside, piece.start, piece.along) else {
             continue;
         };
         let range = [range[0].max(0.0), range[1].min(piece.length)];

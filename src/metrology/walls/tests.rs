@@ -371,3 +371,20 @@ fn what_is_left_on_a_round_wall_is_as_high_as_it_is_thick() {
         }
     }
 }
+
+/// A flat that runs along a wall touches the end of the walls across it, and cuts nothing there.
+#[test]
+fn a_cutter_that_touches_a_wall_cuts_none_across_it() {
+    let floor = 1.0;
+    for depth in [0.0, 1e-7, 0.02] {
+        let part = steps([[0.0, 7.0, 15.0, 20.0], [0.0, 4.0, 8.0, 12.0]], [[floor, HEIGHT, HEIGHT]; 3]);
+        let mut path = faced_and_around(3.0, HEIGHT, [0.0; 4], 0.0);
+        let x = 4.0 + depth;
+        let rows = [[0.5, 20.0], [0.5, floor]].map(|[x, z]| [x, -8.0, z]);
+        let along = [[0.5, 20.0, floor], [x, 20.0, floor], [x, -8.0, floor], [x, -8.0, 20.0]];
+        path.moves.extend(path_through(rows.into_iter().chain(along).map(Point3::from)).moves);
+        let measured = measured(&part, &Cutter::flat(6.0).unwrap(), &path);
+        let deepest = measured.gouge.max_depth_mm;
+        assert!((deepest - depth).abs() < 2e-6, "{depth} {:?}", measured.gouge);
+    }
+}
