@@ -235,8 +235,6 @@ impl Walls {
         let gouge = &mut measured.gouge;
         let depth = |k: u32| self.strips[k as usize].cut.depth;
         let possible = gouge.max_depth_mm + gouge.error_bound_mm;
-        // As deep as what cells see beside a wall is the wall's own place, which comes first.
-        let of_cells = std::mem::take(&mut gouge.regions);
         for region in self.connected(&|k| depth(k) > limits.gouge) {
             let Some(&deepest) = region.iter().max_by(|a, b| depth(**a).total_cmp(&depth(**b))) else {
                 continue;
@@ -253,7 +251,6 @@ impl Walls {
                 ..GougeRegion::default()
             });
         }
-        gouge.regions.extend(of_cells);
         gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
         gouge.regions.truncate(LISTED_REGIONS);
         let deepest = self.strips.iter().map(|strip| strip.cut.depth).fold(0.0, f64::max);

@@ -53,15 +53,13 @@ pub(super) fn deepest(piece: &WallPiece, moves: &Moves<'_>, near: &[u32]) -> Dee
         }
         let [a, b] = moves.ends(k);
         let tip = a.z.min(b.z) + FLOOR;
-        // A touch is no cut: beside the end of a strip it would be one of any depth.
-        let inside = moves.radius(k) - TOUCH;
-        let Some(range) = stadium(&a.xy(), &b.xy(), inside, piece.start, piece.along) else {
-            continue;
+        let within = |radius: f64| {
+            let range = stadium(&a.xy(), &b.xy(), radius, piece.start, piece.along)?;
+            Some([range[0].max(0.0), range[1].min(piece.length)]).filter(|range| range[0] <= range[1])
         };
-        let range = [range[0].max(0.0), range[1].min(piece.length)];
-        if range[0] > range[1] {
-            continue;
-        }
+        // A touch is no cut: beside the end of a strip it would be one of any depth.
+        let comes_in = within(moves.radius(k) - TOUCH).is_some();
+        let Some(range) = within(moves.radius(k)).filter(|_| comes_in) else { continue };
         let edges: [&dyn Fn(f64) -> f64; 2] = [&|u| piece.high_at(u), &|u| piece.low_at(u).max(tip)];
         // The lower edge matters to walls that are not quite vertical only.
         for edge in &edges[..if piece.lean == 0.0 { 1 } else { 2 }] {
