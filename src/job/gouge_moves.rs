@@ -51,6 +51,7 @@ fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u3
         let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
         cutter.height((tip.x - at.x).hypot(tip.y - at.y)).map_or(f64::INFINITY, |above| tip.z + above)
     };
-    let begins = (1..=PLACES).all(|k| height(k) >= height(0));
+    // A place at the very side of the sweep may lie beside all of these places.
+    let begins = height(0).is_finite() && (1..=PLACES).all(|k| height(k) >= height(0));
     line(if begins { before } else { step })
 }

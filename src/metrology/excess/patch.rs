@@ -6,7 +6,6 @@ use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
-use crate::figures::NUMERICAL_FLOOR;
 use crate::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -22,6 +21,9 @@ const MOST_MOVES: usize = 5;
 
 /// Moves that are followed along a path to the lowest one. Cells show one of so many short ones.
 const MOST_BESIDE: usize = 16;
+
+/// Heights that differ by less, mm, are one level.
+const LEVEL: f64 = 1e-9;
 
 /// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of thousands of squares.
 const MOST_ASKED: usize = 4096;
@@ -126,6 +128,8 @@ impl Patches<'_> {
                     return Held::Unknown;
                 };
                 let place = piece.foot.point.xy();
+                // Where facets meet in a square, no line cuts off what a wall accounts for.
+                let here = self.inspection.walls.map_or(here, |walls| walls.beside(&piece.foot.point, here));
                 held = Some(match held {
                     None => (possible, place, here, by),
                     Some((most, at, highest, its)) => {
@@ -280,21 +284,15 @@ impl Patches<'_> {
     }
 
     /// What stands above a piece of a square at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
-    /// All moves are asked where those that cells show tell nothing or no more than the stock, and in a `small` square where they leave a
-    /// wall.
+    /// All moves are asked where those that cells show tell nothing, or where another one cut what they leave, and in a `small` square where
+    /// they leave a wall.
     fn above(&self, piece: &Clipped, half: f64, small: bool) -> Option<(f64, f64, u32)> {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let hidden = self.hidden(point, normal);
         let shown = self.above_with(piece, half, hidden.clone(), None);
         let is_wall = |possible: f64, here: f64| possible > self.wall_over(here, half);
         let stands = |here: f64| here <= self.least || self.cut_away_below(&piece.foot, here).is_none();
-        // None of the moves that cells show passes all of the square, though one cut its middle.
-        let stock = (self.stock_top - point.z) * normal.z;
-        let is_passed = |possible: f64, here: f64| possible < stock || here >= stock;
-        let is_enough = |possible: f64, here: f64| {
-            is_passed(possible, here) && (!small || !is_wall(possible, here) && stands(here))
-        };
-        if shown.is_some_and(|(possible, here, _)| is_enough(possible, here)) {
+        if shown.is_some_and(|(possible, here, _)| stands(here) && !(small && is_wall(possible, here))) {
             return shown;
         }
         let lowest = self.lowest_of_all(piece, 0.0);
@@ -330,14 +328,8 @@ impl Patches<'_> {
         let mut low: Vec<(f64, u32)> = all.iter().filter_map(over).collect();
         let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if low.len() > MOST_LOW {
-            // Of flats more may be equally low.
-            let lowest = low.iter().fold(f64::INFINITY, |lowest, (z, _)| lowest.min(*z));
-            let equal = low.iter().filter(|(z, _)| *z <= lowest + NUMERICAL_FLOOR).count();
-            let most = MOST_LOW.max(equal);
-            if most < low.len() {
-                low.select_nth_unstable_by(most, order);
-                low.truncate(most);
-            }
+            low.select_nth_unstable_by(MOST_LOW, order);
+            low.truncate(MOST_LOW);
         }
         low.sort_unstable_by(order);
         let corners = piece.corners.iter().zip(&piece.leans).take(piece.len);
@@ -386,8 +378,18 @@ impl Patches<'_> {
         }
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
-        let free = self.by_moves(piece, known, here.by, &hidden, all);
-        let is_wall = free.is_none_or(|possible| possible > self.wall_over(here.distance, half));
+        let mut free = self.by_moves(piece, known, here.by, &hidden, all);
+        let is_wall = |free: Option<f64>| free.is_none_or(|p| p > self.wall_over(here.distance, half));
+        // No known move passes all of the square, though one cut its middle.
+        let stock = (self.stock_top - point.z) * normal.z;
+        let is_unpassed = here.distance < stock && free.is_none_or(|possible| possible >= stock);
+        if (is_unpassed || is_wall(free))
+            && let Some(nearest) = self.nearest_of_lowest(&(point + normal * known))
+        {
+            hidden.to_mut().push(nearest);
+            free = self.by_moves(piece, known, here.by, &hidden, all);
+        }
+        let is_wall = is_wall(free);
         let wall = if is_wall { self.beside_wall(piece, half, known, &hidden, all) } else { None };
         let possible = [free, wall].into_iter().flatten().reduce(f64::min)?;
         Some((possible.max(known), here.distance, here.by))
@@ -471,6 +473,38 @@ impl Patches<'_> {
         found
     }
 
+    /// Of all moves that are lowest over a point the one whose axis is nearest in the plan; `None` where there are too many to ask. Of many
+    /// short moves on one level, the first that came over the centre of a cell may end beside it.
+    fn nearest_of_lowest(&self, point: &Point3) -> Option<u32> {
+        let envelope = &self.inspection.surface.envelope;
+        let all = self.inspection.every_move?.over(point.xy());
+        if all.len() > MOST_ASKED {
+            return None;
+        }
+        let mut best: Option<(f64, f64, u32)> = None;
+        for &by in all {
+            let Some(z) = envelope.height(by, point.x, point.y).filter(|z| *z < self.stock_top) else {
+                continue;
+            };
+            let least = best.map_or(f64::INFINITY, |best| best.0);
+            if z > least + LEVEL {
+                continue;
+            }
+            let off = self.off(by, point);
+            if z < least - LEVEL || best.is_none_or(|best| off < best.1) {
+                best = Some((z, off, by));
+            }
+        }
+        best.map(|best| best.2)
+    }
+
+    /// How far a point is from the axis of a move in the plan, mm.
+    fn off(&self, by: u32, point: &Point3) -> f64 {
+        let path = self.inspection.surface.path;
+        let ends = [path.start_of(by as usize), path.moves[by as usize].to.tip].map(|tip| tip.xy());
+        geometry::distance_to_segment(&point.xy(), &ends[0], &ends[1])
+    }
+
     /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
     fn moves(&self, point: &Point3, first: u32, hidden: &[u32]) -> Vec<u32> {
         let surface = self.inspection.surface;
@@ -483,6 +517,13 @@ impl Patches<'_> {
             all.filter_map(|by| Some((surface.envelope.height(by, point.x, point.y)?, by))).collect();
         low.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         low.dedup_by_key(|m| m.1);
+        if low.get(MOST_MOVES).is_some_and(|next| next.0 <= low[0].0 + LEVEL) {
+            // Of moves on one level the nearest pass most of a square.
+            let level = low.iter().take_while(|m| m.0 <= low[0].0 + LEVEL).count();
+            low.truncate(level);
+            let off = |m: &(f64, u32)| self.off(m.1, point);
+            low.sort_by(|a, b| off(a).total_cmp(&off(b)).then(a.1.cmp(&b.1)));
+        }
         low.truncate(MOST_MOVES);
         low.into_iter().map(|m| m.1).collect()
     }

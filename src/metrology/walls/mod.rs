@@ -382,11 +382,10 @@ fn passing(piece: &WallPiece, moves: &Moves<'_>, near: &[u32], reach: f64) -> Ve
     near.iter().filter(passes).copied().collect()
 }
 
-/// How far the block goes on from a place along a level normal, mm.
-fn way_out(block: &Aabb, q: Point2, n: Vector2) -> f64 {
-    let along = |c: usize| {
+/// How far the block goes on from a place along a level normal, in x and in y, mm.
+fn way_out(block: &Aabb, q: Point2, n: Vector2) -> [f64; 2] {
+    [0, 1].map(|c| {
         let side = if n[c] > 0.0 { block.max[c] } else { block.min[c] };
         if n[c] == 0.0 { f64::INFINITY } else { ((side - q[c]) / n[c]).max(0.0) }
-    };
-    along(0).min(along(1))
+    })
 }

@@ -96,19 +96,18 @@ impl WallPiece {
 
     /// How deep a cut at `u` may be and belong to this wall, mm.
     pub fn own_depth(&self, u: f64) -> f64 {
-        self.own(u, &self.behind)
+        let [first, last] = self.own(u, &self.behind);
+        first.min(last)
     }
 
-    /// How far material at `u` may stand out and belong to this wall, mm.
-    pub fn own_height(&self, u: f64) -> f64 {
+    /// How far material at `u` may stand out and belong to this wall, by the turn at either end, mm.
+    pub fn own_heights(&self, u: f64) -> [f64; 2] {
         self.own(u, &self.before)
     }
 
-    fn own(&self, u: f64, slopes: &[f64; 2]) -> f64 {
+    fn own(&self, u: f64, slopes: &[f64; 2]) -> [f64; 2] {
         let from_ends = [u + self.beyond[0], self.length - u + self.beyond[1]];
-        let own =
-            |k: usize| if slopes[k].is_finite() { slopes[k] * from_ends[k].max(0.0) } else { f64::INFINITY };
-        own(0).min(own(1))
+        [0, 1].map(|k| if slopes[k].is_finite() { slopes[k] * from_ends[k].max(0.0) } else { f64::INFINITY })
     }
 
     /// The middle, with the wall's normal.
@@ -132,12 +131,23 @@ impl WallPiece {
         let top = quarters.map(top);
         self.floor = self.extended(floor, f64::min);
         self.top = self.extended(top, f64::max);
-        let sides = [(0, -self.beyond[0] - AHEAD), (1, self.length + self.beyond[1] + AHEAD)];
+        // No farther than a neighbour of the same length goes: what lies beyond that one turns more.
+        let ahead = AHEAD.min(self.beyond[0] + self.length + self.beyond[1]);
+        let sides = [(0, -self.beyond[0] - ahead), (1, self.length + self.beyond[1] + ahead)];
         let level = self.middle().0.z;
         for (side, u) in sides {
-            let is_solid = |aside: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
+            let end = [0.0, self.length][side];
+            let rise = (self.top[1] - self.top[0]) / self.length;
+            let top = self.top[side] + rise * (u - end);
+            // A cut from the top leads out over a lower one beyond the end; tops that fall no more than a slope does are the same one.
+            let behind = |aside: f64| level.max(top - STEEPEST * (ahead + aside));
+            let is_solid =
+                |aside: f64, level: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
             // Behind a convex edge material begins aside, before a concave one it ends there.
-            let slopes = [medial(&|aside| !is_solid(-aside)), medial(&|aside| is_solid(aside))];
+            let slopes = [
+                medial(ahead, &|aside| !is_solid(-aside, behind(aside))),
+                medial(ahead, &|aside| is_solid(aside, level)),
+            ];
             [self.behind[side], self.before[side]] = slopes;
         }
         self
@@ -163,12 +173,12 @@ fn height_at(part: &Part, piece: &WallPiece, u: f64, aside: f64) -> Option<f64> 
     part.highest_at(q.x, q.y).map(|design| design.point.z)
 }
 
-/// How fast the medial axis at the end of a wall leaves it, where the wall turns so that `holds` up to some way aside.
-fn medial(holds: &dyn Fn(f64) -> bool) -> f64 {
-    if !holds(STRAIGHT * AHEAD) {
+/// How fast the medial axis at the end of a wall leaves it, where the wall turns so that `holds` up to some way aside, so far `ahead`, mm.
+fn medial(ahead: f64, holds: &dyn Fn(f64) -> bool) -> f64 {
+    if !holds(STRAIGHT * ahead) {
         return f64::INFINITY;
     }
-    let (mut within, mut out) = (STRAIGHT * AHEAD, MOST_ASIDE * AHEAD);
+    let (mut within, mut out) = (STRAIGHT * ahead, MOST_ASIDE * ahead);
     if holds(out) {
         // A right angle, or one so near to it or beyond that a place aside does not tell.
         return 1.0;
@@ -177,7 +187,7 @@ fn medial(holds: &dyn Fn(f64) -> bool) -> f64 {
         let middle = 0.5 * (within + out);
         *(if holds(middle) { &mut within } else { &mut out }) = middle;
     }
-    let turn = (within / AHEAD).atan();
+    let turn = (within / ahead).atan();
     1.0 / (0.5 * turn).tan()
 }
 

@@ -75,7 +75,7 @@ impl Moves<'_> {
             within
         };
         // One stretch that begins behind the line's begin goes on in front of it only where that is inside.
-        (begin >= 0.0 || over(0.0) <= 0.0).then_some(begin)
+        (begin >= 0.0 || over(0f64.max(first + inside)) <= 0.0).then_some(begin)
     }
 }
 

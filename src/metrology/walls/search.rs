@@ -6,7 +6,8 @@
 
 use geometry::{Point2, Vector2};
 
-use super::piece::WallPiece;
+use super::NUMERICAL_FLOOR;
+use super::piece::{QUARTERS, WallPiece};
 use super::reach::{Line, Moves, greatest, stadium};
 
 /// Parts of a strip that are looked at, at most. With fewer, wide bounds stay where many short moves meet.
@@ -17,6 +18,9 @@ const MOST_DEPTH: u32 = 24;
 
 /// Less is rounding, mm.
 const FLOOR: f64 = 1e-7;
+
+/// A cutter that comes no farther into a line along a wall than this only touches it, mm.
+const TOUCH: f64 = NUMERICAL_FLOOR;
 
 /// A strip's deepest cut.
 #[derive(Debug, Clone, Copy, Default)]
@@ -34,7 +38,7 @@ pub(super) struct Highest {
     /// No place is higher.
     pub possible: f64,
     pub at: [f64; 2],
-    /// Mean over its corners, and the share of these above a height.
+    /// Mean over some places, and the share of these above a height; 0 where none is higher.
     pub mean: f64,
     pub share: f64,
 }
@@ -49,13 +53,13 @@ pub(super) fn deepest(piece: &WallPiece, moves: &Moves<'_>, near: &[u32]) -> Dee
         }
         let [a, b] = moves.ends(k);
         let tip = a.z.min(b.z) + FLOOR;
-        let Some(range) = stadium(&a.xy(), &b.xy(), moves.radius(k), piece.start, piece.along) else {
-            continue;
+        let within = |radius: f64| {
+            let range = stadium(&a.xy(), &b.xy(), radius, piece.start, piece.along)?;
+            Some([range[0].max(0.0), range[1].min(piece.length)]).filter(|range| range[0] <= range[1])
         };
-        let range = [range[0].max(0.0), range[1].min(piece.length)];
-        if range[0] > range[1] {
-            continue;
-        }
+        // A touch is no cut: beside the end of a strip it would be one of any depth.
+        let comes_in = within(moves.radius(k) - TOUCH).is_some();
+        let Some(range) = within(moves.radius(k)).filter(|_| comes_in) else { continue };
         let edges: [&dyn Fn(f64) -> f64; 2] = [&|u| piece.high_at(u), &|u| piece.low_at(u).max(tip)];
         // The lower edge matters to walls that are not quite vertical only.
         for edge in &edges[..if piece.lean == 0.0 { 1 } else { 2 }] {
@@ -97,8 +101,8 @@ pub(super) struct Standing<'a> {
     pub moves: &'a Moves<'a>,
     /// No material is looked for farther off, mm.
     pub reach: f64,
-    /// How far the block goes on from a place along a normal, mm.
-    pub way_out: &'a (dyn Fn(Point2, Vector2) -> f64 + Sync),
+    /// How far the block goes on from a place along a normal, in x and in y, mm.
+    pub way_out: &'a (dyn Fn(Point2, Vector2) -> [f64; 2] + Sync),
     /// What stands up to this height over a floor is the floor's, mm.
     pub of_floor: f64,
     /// How near the bound is asked for, mm.
@@ -126,6 +130,8 @@ struct Seen {
     bounding: [f64; 4],
     at: [[f64; 2]; 4],
     possible: f64,
+    /// Whether no move bounds it more than where the material before the strip ends anyhow.
+    by_ends: bool,
 }
 
 impl Standing<'_> {
@@ -137,9 +143,6 @@ impl Standing<'_> {
         for u in self.above_floor(piece) {
             let whole = Part { u, v: [0.0, 1.0], possible: f64::INFINITY, along: true, depth: 0 };
             let seen = look(&whole);
-            let quarter = 0.25 * (u[1] - u[0]);
-            found.mean += quarter * seen.corners.iter().sum::<f64>();
-            found.share += quarter * seen.corners.iter().filter(|h| **h > self.counted).count() as f64;
             found.look_at(&seen);
             open.push(Part { possible: seen.possible, along: seen.is_along(), ..whole });
         }
@@ -162,6 +165,17 @@ impl Standing<'_> {
             }
         }
         found.possible = open.iter().map(|part| part.possible).fold(closed.max(found.height), f64::max);
+        if found.height > self.counted {
+            // Between the ends: there other walls begin.
+            for [a, b] in self.above_floor(piece) {
+                let u = QUARTERS.map(|share| a + share * (b - a));
+                let part = Part { u, v: QUARTERS, possible: found.possible, along: true, depth: 0 };
+                let corners = look(&part).corners;
+                let quarter = 0.25 * (b - a);
+                found.mean += quarter * corners.iter().sum::<f64>();
+                found.share += quarter * corners.iter().filter(|h| **h > self.counted).count() as f64;
+            }
+        }
         found
     }
 
@@ -196,13 +210,17 @@ impl Standing<'_> {
             [u, low + (piece.high_at(u) - low) * v]
         });
         let lines = at.map(|[u, z]| Line { from: piece.place(u, z).xy(), way: piece.normal, z });
-        let most = [0, 1, 2, 3].map(|c| {
-            let own = piece.own_height(at[c][0]);
-            self.reach.min((self.way_out)(lines[c].from, lines[c].way)).min(own)
+        // Each of these is convex along the strip and upward. The least of them is not: material is highest between two ends.
+        let ends = [0, 1, 2, 3].map(|c| {
+            let ([x, y], [first, last]) =
+                ((self.way_out)(lines[c].from, lines[c].way), piece.own_heights(at[c][0]));
+            [self.reach, x, y, first, last]
         });
-        let mut corners = most;
-        let mut bounding = most;
+        let most = ends.map(|of| of.into_iter().fold(f64::INFINITY, f64::min));
         let greatest = |corners: &[f64; 4]| corners.iter().copied().fold(0.0, f64::max);
+        let lid = (0..5).map(|k| greatest(&ends.map(|of| of[k]))).fold(f64::INFINITY, f64::min);
+        let mut corners = most;
+        let mut bounding = [f64::INFINITY; 4];
         for &k in near {
             let begins = [0, 1, 2, 3].map(|c| {
                 let begin = self.moves.begin(k, &lines[c]).map_or(f64::INFINITY, |begin| begin.max(0.0));
@@ -213,9 +231,9 @@ impl Standing<'_> {
                 bounding = begins;
             }
         }
-        let possible = greatest(&most).min(greatest(&bounding));
-        (0..4).for_each(|c| bounding[c] = bounding[c].min(most[c]));
-        Seen { corners, bounding, at, possible }
+        let by_ends = greatest(&bounding) > lid;
+        let possible = lid.min(greatest(&bounding));
+        Seen { corners, bounding, at, possible, by_ends }
     }
 }
 
@@ -245,6 +263,6 @@ impl Part {
 impl Seen {
     fn is_along(&self) -> bool {
         let [a, b, c, d] = self.bounding;
-        (a - b).abs().max((d - c).abs()) >= (a - d).abs().max((b - c).abs())
+        self.by_ends || (a - b).abs().max((d - c).abs()) >= (a - d).abs().max((b - c).abs())
     }
 }

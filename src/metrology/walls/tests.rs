@@ -254,3 +254,137 @@ fn what_stands_at_the_foot_of_a_low_step_does_not_depend_on_cells() {
         assert!(found.highest.error_bound_mm < 2e-3, "{cell} {found:?}");
     }
 }
+
+/// A ring of facets whose section is a polygon of radii, at mid-facet, and heights.
+fn turned(facets: usize, section: &[[f64; 2]]) -> Part {
+    let vertices =
+        section.iter().flat_map(|&[r, z]| (0..facets).map(move |k| corner(facets, r, k, z))).collect();
+    let triangles = (0..section.len())
+        .flat_map(|ring| (0..facets).map(move |k| (ring, k)))
+        .flat_map(|(ring, k)| {
+            let at = |ring: usize, k: usize| (ring % section.len() * facets + k % facets) as u32;
+            let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+            [[a, c, b], [a, d, c]]
+        })
+        .collect();
+    Part::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0)
+}
+
+/// A corner of a regular polygon, the middles of whose sides lie `apothem` from the axis.
+fn corner(sides: usize, apothem: f64, k: usize, z: f64) -> Point3 {
+    let turn = std::f64::consts::TAU / sides as f64;
+    let (sin, cos) = (turn * k as f64).sin_cos();
+    let r = apothem / (0.5 * turn).cos();
+    Point3::new(r * cos, r * sin, z)
+}
+
+/// Once around such a polygon, from above and back.
+fn once_around(sides: usize, apothem: f64, z: f64) -> impl Iterator<Item = Point3> {
+    let above = corner(sides, apothem, 0, 20.0);
+    let around = (0..=sides).map(move |k| corner(sides, apothem, k, z));
+    std::iter::once(above).chain(around).chain([above])
+}
+
+/// Rows over all that lies so far around the axis, at the height of the blocks.
+fn faced(far: f64) -> impl Iterator<Item = Point3> {
+    (0..=16).flat_map(move |k| {
+        let y = far * (0.125 * f64::from(k) - 1.0);
+        let ends = if k % 2 == 0 { [-far, far, far] } else { [far, -far, -far] };
+        let heights = if k == 16 { [HEIGHT, HEIGHT, 20.0] } else { [HEIGHT; 3] };
+        (0..3).map(move |end| Point3::new(ends[end], y, heights[end]))
+    })
+}
+
+/// A round plate of facets from z = 0 up, with a round hole of as many, whose mid-facets lie `radius` from the axis; and how a flat
+/// that is as wide as the hole cuts its outer wall and, down to `bottom`, the hole.
+fn drilled(facets: usize, radius: f64, bottom: Option<f64>) -> (Part, Cutter, Toolpath) {
+    let part =
+        turned(facets, &[[radius, 0.0], [3.0 * radius, 0.0], [3.0 * radius, HEIGHT], [radius, HEIGHT]]);
+    let hole = bottom.into_iter().flat_map(|z| [20.0, z, 20.0].map(|z| Point3::new(0.0, 0.0, z)));
+    let around = once_around(facets, 4.0 * radius, 0.0);
+    let path = path_through(faced(3.0 * radius + 3.0).chain(around).chain(hole));
+    (part, Cutter::flat(2.0 * radius).unwrap(), path)
+}
+
+/// What is left in a hole stands out from its wall by the hole's radius, however narrow the facets are beside the cells.
+#[test]
+fn a_plug_left_in_a_round_hole_stands() {
+    let radius = 1.5;
+    for (facets, bottom, cell) in
+        [(12, None, 0.2), (48, None, 0.2), (48, None, 0.05), (48, Some(3.0), 0.1), (300, Some(3.0), 0.1)]
+    {
+        let (part, cutter, path) = drilled(facets, radius, bottom);
+        let Measurement { uncut, excess, .. } = measured_on(cell, &part, &cutter, &path);
+        let wide = std::f64::consts::TAU * radius * bottom.unwrap_or(HEIGHT);
+        let off = (uncut.max_height_mm - radius).abs();
+        assert!(off < 2e-3 && uncut.error_bound_mm < 2e-3, "{facets} {bottom:?} {cell} {uncut:?}");
+        assert!((uncut.area_mm2 - wide).abs() < 0.1 * wide, "{facets} {bottom:?} {cell} {uncut:?} {wide}");
+        assert!(excess.unreached.at_most() > LIMITS.uncut, "{excess:?}");
+    }
+}
+
+/// A flat as wide as a hole leaves the corners between its facets, and nothing else.
+#[test]
+fn a_drilled_hole_holds_no_more_than_its_corners() {
+    let radius = 1.5;
+    for (facets, cell) in [(48, 0.2), (48, 0.05), (300, 0.1)] {
+        let (part, cutter, path) = drilled(facets, radius, Some(-0.5));
+        let Measurement { uncut, excess, gouge, .. } = measured_on(cell, &part, &cutter, &path);
+        let corner = radius / (std::f64::consts::PI / facets as f64).cos() - radius;
+        assert!(uncut.region_count == 0 && gouge.max_depth_mm < 1e-6, "{facets} {cell} {uncut:?} {gouge:?}");
+        assert!(excess.highest.at_most() < corner + 2e-3, "{facets} {cell} {excess:?} {corner}");
+    }
+}
+/// A ring with a floor at z = 1 before a round wall whose corners lie 4 mm from the axis, inside of it (a pocket) or outside (a boss). A flat
+/// of 2 mm follows the true circle and leaves `thick` on it.
+fn round_wall(facets: usize, is_pocket: bool, thick: f64) -> (Part, Cutter, Toolpath) {
+    const SIDES: usize = 2000;
+    let (tool, hole, wall, out, floor) = (1.0, 1.0, 4.0, 7.0, 1.0);
+    let at = wall * (std::f64::consts::PI / facets as f64).cos();
+    let [inner, outer] = if is_pocket { [floor, HEIGHT] } else { [HEIGHT, floor] };
+    let section = [[hole, 0.0], [out, 0.0], [out, outer], [at, outer], [at, inner], [hole, inner]];
+    let part = turned(facets, &section);
+    let side = if is_pocket { -1.0 } else { 1.0 };
+    let last = wall + side * (tool + thick);
+    let rings = [last + side * 2.6, last + side * 1.3, last];
+    let rings = rings.into_iter().filter(move |r| *r > 0.0);
+    let floors = rings.flat_map(move |r| once_around(SIDES, r, floor));
+    let drilled = [20.0, -0.5, 20.0].map(|z| Point3::new(0.0, 0.0, z));
+    let path = faced(out + 2.0).chain(once_around(facets, out + tool, 0.0)).chain(floors).chain(drilled);
+    (part, Cutter::flat(2.0 * tool).unwrap(), path_through(path))
+}
+
+/// A cutter that follows a circle leaves what the circle is off the facets, and what it keeps off the circle.
+#[test]
+fn what_is_left_on_a_round_wall_is_as_high_as_it_is_thick() {
+    for (facets, cell) in [(120, 0.1), (400, 0.05)] {
+        let sagitta = 4.0 * (1.0 - (std::f64::consts::PI / facets as f64).cos());
+        for (is_pocket, thick) in [(true, 0.0), (true, 0.001), (true, 0.03), (false, 0.0), (false, 0.01)] {
+            let (part, cutter, path) = round_wall(facets, is_pocket, thick);
+            let Measurement { uncut, excess, gouge, .. } = measured_on(cell, &part, &cutter, &path);
+            let [left, cut] = if is_pocket { [thick, sagitta - thick] } else { [thick + sagitta, -thick] };
+            let told = format!("{facets} {is_pocket} {thick} {uncut:?} {excess:?} {gouge:?}");
+            assert!(uncut.region_count == 0, "{told}");
+            assert!((excess.highest.max_mm - left).abs() < 2e-3, "{left} {told}");
+            assert!(excess.highest.at_most() < left + 3e-3, "{left} {told}");
+            assert!((gouge.max_depth_mm - cut.max(0.0)).abs() < 2e-3, "{cut} {told}");
+        }
+    }
+}
+
+/// A flat that runs along a wall touches the end of the walls across it, and cuts nothing there.
+#[test]
+fn a_cutter_that_touches_a_wall_cuts_none_across_it() {
+    let floor = 1.0;
+    for depth in [0.0, 1e-7, 0.02] {
+        let part = steps([[0.0, 7.0, 15.0, 20.0], [0.0, 4.0, 8.0, 12.0]], [[floor, HEIGHT, HEIGHT]; 3]);
+        let mut path = faced_and_around(3.0, HEIGHT, [0.0; 4], 0.0);
+        let x = 4.0 + depth;
+        let rows = [[0.5, 20.0], [0.5, floor]].map(|[x, z]| [x, -8.0, z]);
+        let along = [[0.5, 20.0, floor], [x, 20.0, floor], [x, -8.0, floor], [x, -8.0, 20.0]];
+        path.moves.extend(path_through(rows.into_iter().chain(along).map(Point3::from)).moves);
+        let measured = measured(&part, &Cutter::flat(6.0).unwrap(), &path);
+        let deepest = measured.gouge.max_depth_mm;
+        assert!((deepest - depth).abs() < 2e-6, "{depth} {:?}", measured.gouge);
+    }
+}
