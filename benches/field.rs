@@ -1,7 +1,8 @@
-//! Stream functions: B-spline fits of 200 × 200 samples to 40 × 40 coefficients by each solver, differences, and
-//! Poisson's equation on 500 × 500 cells, flat and on a wave, on one thread; directions, ψ and all passes on a mesh of
-//! 500,000 triangles on every thread that `RAYON_NUM_THREADS` allows; and whole plans, from the part to the joined path, by a field of
-//! 500 × 500 nodes and on such a mesh: `cargo bench --bench field planned`.
+//! Stream functions: B-spline fits of 200 × 200 samples to 40 × 40 coefficients by each solver, differences,
+//! and Poisson's equation on 500 × 500 cells, flat and on a wave, on one thread; directions, ψ and all passes
+//! on a mesh of 500,000 triangles on every thread that `RAYON_NUM_THREADS` allows; and whole plans, from the
+//! part to the joined path, by a field of 500 × 500 nodes and on such a mesh:
+//! `cargo bench --bench field planned`.
 
 use divan::Bencher;
 use millstream::cutter::Cutter;

@@ -1,5 +1,5 @@
-//! Poses of a tool along passes over a wave of a million triangles, each asked for cutter and holder, and the least clearance
-//! of a whole path. The table gives poses, or moves, per second.
+//! Poses of a tool along passes over a wave of a million triangles, each asked for cutter and holder, and the
+//! least clearance of a whole path. The table gives poses, or moves, per second.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

@@ -1,9 +1,9 @@
 //! Planning of pockets with a bounded engagement: time, lengths and verdict on many shapes, as a table.
 //!
-//! `cargo bench --bench pockets -- [SHAPE ...] [DEGREES ...]`; without words every shape at 60, 40 and 20 degrees. Leaves the
-//! scenes in `target/pockets/`, for `millstream run` and `benches/freecad_adaptive.py`. "plan" is planning alone, in all rounds;
-//! "angles" is the measured engagement, which decides about another round; both s of wall time and (on Linux) of processor
-//! time. Nothing is asserted.
+//! `cargo bench --bench pockets -- [SHAPE ...] [DEGREES ...]`; without words every shape at 60, 40 and 20
+//! degrees. Leaves the scenes in `target/pockets/`, for `millstream run` and `benches/freecad_adaptive.py`.
+//! "plan" is planning alone, in all rounds; "angles" is the measured engagement, which decides about another
+//! round; both s of wall time and (on Linux) of processor time. Nothing is asserted.
 
 use std::error::Error;
 use std::f64::consts::{PI, TAU};

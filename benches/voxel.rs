@@ -1,5 +1,5 @@
-//! What voxels cost: a wave of 100 × 100 mm in passes 0.3 mm apart with chords of 1 mm (34,000 moves) by a ball
-//! of radius 3 mm with upright and with turning axes, and by a bull nose. Voxels of 0.1 mm;
+//! What voxels cost: a wave of 100 × 100 mm in passes 0.3 mm apart with chords of 1 mm (34,000 moves) by a
+//! ball of radius 3 mm with upright and with turning axes, and by a bull nose. Voxels of 0.1 mm;
 //! `RAYON_NUM_THREADS=1` for one thread. divan prints the rates (items are moves).
 
 use divan::Bencher;

@@ -1,6 +1,7 @@
 //! A path of one's own, cut and measured without a scene and without a planner.
 //!
-//! Two straight passes of a ball, 1 mm apart, on a level plate: the ridge between them is `r - √(r² - s²/4)` high.
+//! Two straight passes of a ball, 1 mm apart, on a level plate: the ridge between them is `r - √(r² - s²/4)`
+//! high.
 //!
 //! `cargo run --release --example measure_own_path`
 

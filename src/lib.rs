@@ -1,5 +1,5 @@
-//! Millstream plans milling paths as the streamlines of a field, cuts the part in a simulator, measures the cut surface,
-//! and says with numbers and error bounds whether the plan is good, before metal is cut.
+//! Millstream plans milling paths as the streamlines of a field, cuts the part in a simulator, measures the
+//! cut surface, and says with numbers and error bounds whether the plan is good, before metal is cut.
 //!
 //! A scene in, a report out:
 //!
@@ -14,8 +14,8 @@
 //! # Ok::<(), millstream::JobError>(())
 //! ```
 //!
-//! [`Session`] keeps the part; [`Session::toolpath`] leaves path, maps and meshes of one toolpath too. Each stage can be
-//! used alone. They are the modules of this crate, each on top of those before it:
+//! [`Session`] keeps the part; [`Session::toolpath`] leaves path, maps and meshes of one toolpath too. Each
+//! stage can be used alone. They are the modules of this crate, each on top of those before it:
 //!
 //! | stage | from | to |
 //! |---|---|---|
@@ -29,13 +29,13 @@
 //! | [`program`] | G-code or APT text | motion with lines, tools, feeds; paths |
 //! | [`io`], [`scene`], [`job`], [`report`] | files | a report and its pictures |
 //!
-//! `examples/` has one program for each of: two strategies compared, a path of your own measured, a cutter dropped on a
-//! mesh, a table of scallops.
+//! `examples/` has one program for each of: two strategies compared, a path of your own measured, a cutter
+//! dropped on a mesh, a table of scallops.
 //!
-//! Units: mm, rad in code (degrees in files), mm/min for feed, s for time. Right-handed, z up; the tool axis points from
-//! the tip to the holder. Errors are one enum a stage; a violated tolerance is a finding in the report and no error. Long
-//! work takes a [`monitor::Monitor`], which hears its progress and may cancel it. Results do not depend on the number of
-//! threads.
+//! Units: mm, rad in code (degrees in files), mm/min for feed, s for time. Right-handed, z up; the tool axis
+//! points from the tip to the holder. Errors are one enum a stage; a violated tolerance is a finding in the
+//! report and no error. Long work takes a [`monitor::Monitor`], which hears its progress and may cancel it.
+//! Results do not depend on the number of threads.
 
 pub use job::{JobError, Outcome, Session};
 pub use report::{RunReport, ToolpathReport, ToolpathResult, Verdict};

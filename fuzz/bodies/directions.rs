@@ -1,4 +1,5 @@
-//! Any bytes as a table of directions: a message, or a field that has a finite direction wherever it is asked.
+//! Any bytes as a table of directions: a message, or a field that has a finite direction wherever it is
+//! asked.
 
 use millstream::io::direction_table::parse;
 

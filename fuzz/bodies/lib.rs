@@ -1,5 +1,5 @@
-//! What the fuzz targets do with bytes, each in a module of its own. They are run by libFuzzer (`fuzz_targets/`), and by the
-//! ordinary tests (`tests/all/fuzz.rs`) on seeds and on all that once failed.
+//! What the fuzz targets do with bytes, each in a module of its own. They are run by libFuzzer
+//! (`fuzz_targets/`), and by the ordinary tests (`tests/all/fuzz.rs`) on seeds and on all that once failed.
 
 pub mod apt;
 pub mod directions;

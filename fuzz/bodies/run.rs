@@ -1,4 +1,5 @@
-//! Any bytes as a scene that is run, while that takes little time and memory: a report or a message, never a panic.
+//! Any bytes as a scene that is run, while that takes little time and memory: a report or a message, never a
+//! panic.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,6 @@
-//! Any bytes as a section table, or as a generated blade where they begin like one: a message or sections that are the same
-//! when they are written and read again, and of which a blade can be made, or a message that says why not.
+//! Any bytes as a section table, or as a generated blade where they begin like one: a message or sections
+//! that are the same when they are written and read again, and of which a blade can be made, or a message
+//! that says why not.
 
 use millstream::blade::sections::Sections;
 use millstream::blade::{Blade, BladeSettings, BladeSide, FairingMethod};

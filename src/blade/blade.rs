@@ -1,12 +1,13 @@
 //! A blade's surfaces from its sections.
 //!
-//! Enters: [`Sections`]. Leaves: one patch for each side, or one all around, u along the sections and v from the lowest
-//! to the highest, `du × dv` outward, mm. A closed outline with round edges is one periodic spline, of which its sides are
-//! stretches; other outlines have a spline for each side. Splines may be faired before surfaces are laid through them,
-//! and offset in their planes (see [`loft_of_offsets`] for what that is worth).
+//! Enters: [`Sections`]. Leaves: one patch for each side, or one all around, u along the sections and v from
+//! the lowest to the highest, `du × dv` outward, mm. A closed outline with round edges is one periodic
+//! spline, of which its sides are stretches; other outlines have a spline for each side. Splines may be
+//! faired before surfaces are laid through them, and offset in their planes (see [`loft_of_offsets`] for what
+//! that is worth).
 //!
-//! A blade has no upper side, so its patches keep the outward side that the sections give. Both sides are stretches of one
-//! spline, so that they meet with one tangent.
+//! A blade has no upper side, so its patches keep the outward side that the sections give. Both sides are
+//! stretches of one spline, so that they meet with one tangent.
 
 use super::loft;
 use super::sections::{SectionError, SectionSides, Sections};
@@ -132,8 +133,8 @@ pub struct BladeSection {
 const COMPARED: usize = 8;
 
 impl BladeSection {
-    /// Where the faired curve lies from the drawn one, along the outward normal, mm: least and greatest. `None` if it was not
-    /// faired.
+    /// Where the faired curve lies from the drawn one, along the outward normal, mm: least and greatest.
+    /// `None` if it was not faired.
     pub fn off_drawing(&self) -> Option<[f64; 2]> {
         let faired = &self.faired.as_ref()?.spline;
         let spans = self.spline.parameters().windows(2);
@@ -234,7 +235,8 @@ impl Blade {
         notes
     }
 
-    /// A point that lies off its neighbours, in words, the farthest of its kind. Where more than half of the sections have one it is their shape.
+    /// A point that lies off its neighbours, in words, the farthest of its kind. Where more than half of the
+    /// sections have one it is their shape.
     fn outlier(&self) -> Option<String> {
         let of_curve = |curve: BladeCurve| {
             let all: Vec<&BladeSection> =
@@ -266,8 +268,8 @@ impl Blade {
         ))
     }
 
-    /// Surfaces through the sections offset outward by `distance`, mm, each in its plane. There may be more of them than
-    /// [`Blade::surfaces`] where offsets have corners.
+    /// Surfaces through the sections offset outward by `distance`, mm, each in its plane. There may be more
+    /// of them than [`Blade::surfaces`] where offsets have corners.
     ///
     /// # Errors
     /// [`BladeError::Loft`] where an offset is singular.

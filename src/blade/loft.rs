@@ -7,8 +7,8 @@
 //! ch. 10.3, with points in place of compatible curves). Shares are halved where the surface strays from a
 //! section or leans away from it, so that they crowd where any of the sections bends.
 //!
-//! A surface that only keeps its distance from the sections may still wave where an edge turns within a short length. So it
-//! also keeps their tangents.
+//! A surface that only keeps its distance from the sections may still wave where an edge turns within a short
+//! length. So it also keeps their tangents.
 //!
 //! Closed sections make one patch that is C² across its seam, with knots that are not clamped. `du × dv` lies
 //! to the right of the sections' sense: outward when they run counter-clockwise.

@@ -105,10 +105,12 @@ pub struct VerifyOptions {
     /// Stock above the part's highest point, mm [default: 1].
     #[arg(long, value_name = "MM", value_parser = allowance, conflicts_with = "stock")]
     pub allowance: Option<f64>,
-    /// The stock: a closed mesh in the unit of the part, or a TOML file with the [stock] of a scene [default: a block].
+    /// The stock: a closed mesh in the unit of the part, or a TOML file with the [stock] of a scene [default:
+    /// a block].
     #[arg(long, value_name = "FILE")]
     pub stock: Option<PathBuf>,
-    /// The machine: its kinematics by name, or a TOML file with the [machine] of a scene [default: three axes].
+    /// The machine: its kinematics by name, or a TOML file with the [machine] of a scene [default: three
+    /// axes].
     #[arg(long, value_name = "MACHINE")]
     pub machine: Option<PathBuf>,
     /// Deepest gouge that is tolerated, mm [default: 0.005].
@@ -239,8 +241,8 @@ pub struct ScallopOptions {
     /// Feed direction there in the plan view, degrees from x.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     pub direction: f64,
-    /// Lead of the tool axis from the surface normal, degrees, for cutters that are no ball [default: the normal
-    /// without a part, upright on a part].
+    /// Lead of the tool axis from the surface normal, degrees, for cutters that are no ball [default: the
+    /// normal without a part, upright on a part].
     #[arg(long, value_name = "DEGREES")]
     pub lead: Option<f64>,
     /// Print what the second-order formula and a polynomial section cost, over curvature and step.

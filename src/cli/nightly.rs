@@ -1,8 +1,8 @@
 //! `millstream nightly`: many scenes, each a process of its own; what got worse; the pages that show it.
 //!
-//! The folder of the results has, beside the pages, `scenes` with the results of each scene and `finished` with a record of
-//! each scene that has finished. A record names the digest of all that its figures follow from. By it a later run knows
-//! what need not be run again.
+//! The folder of the results has, beside the pages, `scenes` with the results of each scene and `finished`
+//! with a record of each scene that has finished. A record names the digest of all that its figures follow
+//! from. By it a later run knows what need not be run again.
 
 mod child;
 mod history;
@@ -35,7 +35,8 @@ const MAX_BYTES: u64 = 256 << 20;
 /// The figures of a nightly.
 const FIGURES: &str = "nightly.json";
 
-/// Runs or merges a nightly and writes its pages; the text is for stdout, the verdict fails where something got worse.
+/// Runs or merges a nightly and writes its pages; the text is for stdout, the verdict fails where something
+/// got worse.
 ///
 /// # Errors
 /// [`CliError`]. Scenes that had finished are kept.

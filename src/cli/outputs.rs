@@ -1,8 +1,10 @@
-//! The files of a run: checked before it, gathered during it, and put in their place when all of them are there.
+//! The files of a run: checked before it, gathered during it, and put in their place when all of them are
+//! there.
 //!
-//! [`Outputs::begin`] refuses a folder in which anything stands in the way that is not ours. The results gather in a
-//! staging folder within the target, so that a target on another file system is no matter. [`Outputs::publish`] puts
-//! them in their place so that a kill leaves the old or the new ones. Two runs never write to one folder: each locks it.
+//! [`Outputs::begin`] refuses a folder in which anything stands in the way that is not ours. The results
+//! gather in a staging folder within the target, so that a target on another file system is no matter.
+//! [`Outputs::publish`] puts them in their place so that a kill leaves the old or the new ones. Two runs
+//! never write to one folder: each locks it.
 
 mod disk;
 mod owned;
@@ -83,7 +85,8 @@ fn refused(path: &Path, reason: &str) -> CliError {
 struct FolderLock(fs::File);
 
 impl Drop for FolderLock {
-    /// Closing the file is not enough: a process that another thread starts at this moment has a copy of it for an instant.
+    /// Closing the file is not enough: a process that another thread starts at this moment has a copy of it
+    /// for an instant.
     fn drop(&mut self) {
         let _ = self.0.unlock();
     }
@@ -112,8 +115,8 @@ pub fn wait_until_free(target: &Path) {
 }
 
 impl Outputs {
-    /// Makes `target` and its parents if need be, puts in order what a killed run left there, and makes the staging
-    /// folder.
+    /// Makes `target` and its parents if need be, puts in order what a killed run left there, and makes the
+    /// staging folder.
     ///
     /// # Errors
     /// [`CliError::InTheWay`] when the results would replace anything but those of an earlier run, and

@@ -1,5 +1,5 @@
-//! `millstream scallop`: scallop height from step and step from scallop height, on flat, convex and concave sections and at a
-//! place of a part.
+//! `millstream scallop`: scallop height from step and step from scallop height, on flat, convex and concave
+//! sections and at a place of a part.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -33,7 +33,8 @@ struct CrossSection {
 /// What `scallop` prints.
 ///
 /// # Errors
-/// [`CliError::Scallop`] for numbers that make no scallop, [`CliError::ScallopPart`] for a part that cannot be read.
+/// [`CliError::Scallop`] for numbers that make no scallop, [`CliError::ScallopPart`] for a part that cannot
+/// be read.
 pub fn scallop(options: &ScallopOptions) -> Result<String, CliError> {
     if options.table {
         return table(options);
@@ -68,7 +69,8 @@ fn of_cutter(reason: ScallopError, cutter: &Cutter, fits_from: Option<f64>) -> S
     }
 }
 
-/// The least lead, degrees, with which a cutter fits into a section where it does not: its radius across the feed is `radius_at` a lead.
+/// The least lead, degrees, with which a cutter fits into a section where it does not: its radius across the
+/// feed is `radius_at` a lead.
 fn fitting_lead(curvature: f64, radius_at: impl Fn(f64) -> Result<f64, ScallopError>) -> Option<f64> {
     let fits = |lead: f64| radius_at(lead).is_ok_and(|radius| BallSection::new(radius, curvature).is_ok());
     let steps = (90.0 / LEAD_STEP) as usize;

@@ -1,8 +1,8 @@
 //! The user's wish to stop: Ctrl-C, SIGTERM, SIGHUP.
 //!
-//! The first signal asks the run to stop, the second ends the process at once. What a killed run leaves is put in order
-//! by the next one. A signal that was ignored when the program started stays ignored: `nohup` ignores SIGHUP, and a shell
-//! ignores SIGINT for what it starts in the background.
+//! The first signal asks the run to stop, the second ends the process at once. What a killed run leaves is
+//! put in order by the next one. A signal that was ignored when the program started stays ignored: `nohup`
+//! ignores SIGHUP, and a shell ignores SIGINT for what it starts in the background.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -24,8 +24,8 @@ pub fn listen(stop: &Arc<AtomicBool>, status: u8) {
     }
 }
 
-/// The signals that the process ignores: a bit for each, the lowest for signal 1. Only Linux says so without unsafe code;
-/// elsewhere none counts as ignored.
+/// The signals that the process ignores: a bit for each, the lowest for signal 1. Only Linux says so without
+/// unsafe code; elsewhere none counts as ignored.
 #[cfg(unix)]
 fn ignored() -> u64 {
     mask(&super::system::text("self/status")).unwrap_or(0)

@@ -1,4 +1,5 @@
-//! What the system says of processes and memory. Only Linux says so without unsafe code; elsewhere nothing is known.
+//! What the system says of processes and memory. Only Linux says so without unsafe code; elsewhere nothing is
+//! known.
 
 /// The text of a file below /proc; empty where there is none.
 pub fn text(name: &str) -> String {

@@ -1,4 +1,5 @@
-//! `millstream verify`: a program of another system against a part. It makes a scene of the arguments and runs it.
+//! `millstream verify`: a program of another system against a part. It makes a scene of the arguments and
+//! runs it.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,9 +1,11 @@
-//! A thread that ends what does not answer: a run that was asked to stop, and one that takes more memory than it may.
+//! A thread that ends what does not answer: a run that was asked to stop, and one that takes more memory than
+//! it may.
 //!
-//! Long work asks its monitor whether to go on, and answers within milliseconds. What has to hold whatever the work does is
-//! held here: the process ends soon after a signal, and its memory stays within what the scene allows. Estimates refuse most
-//! runs before they begin; this is for those that no estimate covers. Only memory that the process wrote counts: the system
-//! takes back the pages of the program's own file when it needs them. It is known on Linux only.
+//! Long work asks its monitor whether to go on, and answers within milliseconds. What has to hold whatever
+//! the work does is held here: the process ends soon after a signal, and its memory stays within what the
+//! scene allows. Estimates refuse most runs before they begin; this is for those that no estimate covers.
+//! Only memory that the process wrote counts: the system takes back the pages of the program's own file when
+//! it needs them. It is known on Linux only.
 
 use std::process::exit;
 use std::sync::Arc;
@@ -15,15 +17,17 @@ use indicatif::ProgressBar;
 use super::error::CliError;
 use super::system;
 
-/// How often memory and wishes are looked at. Longer lets a run take more memory unseen; each look takes some 20 µs.
+/// How often memory and wishes are looked at. Longer lets a run take more memory unseen; each look takes some
+/// 20 µs.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// A run that has not answered after this time is ended. Longer is felt as hanging; shorter ends work that would have put
-/// its scratch files away.
+/// A run that has not answered after this time is ended. Longer is felt as hanging; shorter ends work that
+/// would have put its scratch files away.
 const ANSWER: Duration = Duration::from_millis(700);
 
-/// What the program takes beside the memory that a scene allows, MiB: its stacks, its tables, and what its allocator keeps;
-/// and what the allocator keeps for each further thread. Less stops small runs, more lets a run exceed what was allowed.
+/// What the program takes beside the memory that a scene allows, MiB: its stacks, its tables, and what its
+/// allocator keeps; and what the allocator keeps for each further thread. Less stops small runs, more lets a
+/// run exceed what was allowed.
 const BESIDES: u64 = 12;
 const A_THREAD: u64 = 1;
 

@@ -1,7 +1,8 @@
 //! Boxes, cylinders and whole tools that are fixed to a link of a machine, in motion against meshes.
 //!
-//! Enters: a body in the frame of its link, mm, and where that link stands, seen from the mesh, at both ends of each move.
-//! Leaves: the least distance on all moves. On a move the middle of the body runs straight, and it turns evenly.
+//! Enters: a body in the frame of its link, mm, and where that link stands, seen from the mesh, at both ends
+//! of each move. Leaves: the least distance on all moves. On a move the middle of the body runs straight, and
+//! it turns evenly.
 
 use super::piece::{Convex, NearPlace, Sample, ToolPiece};
 use super::sweep::Moving;
@@ -82,7 +83,8 @@ impl Body {
         }
     }
 
-    /// Its surface in the frame of its link, and how far that stands off it outward at most, mm; `None` of a tool.
+    /// Its surface in the frame of its link, and how far that stands off it outward at most, mm; `None` of a
+    /// tool.
     pub fn mesh(&self) -> Option<(TriangleMesh, f64)> {
         let (vertices, triangles, off) = match &self.form {
             Form::Block(half) => {
@@ -234,8 +236,9 @@ impl<'a> Moving for BodyMove<'a> {
 }
 
 impl Obstacle<'_> {
-    /// The least signed distance between a body and the mesh on so many moves, of which `ends` tells where the body's link
-    /// begins and ends; `None` without moves. A link turns by less than half a turn on a move.
+    /// The least signed distance between a body and the mesh on so many moves, of which `ends` tells where
+    /// the body's link begins and ends; `None` without moves. A link turns by less than half a turn on a
+    /// move.
     ///
     /// A body whose middle begins inside a closed mesh is as deep in it as that.
     ///

@@ -6,7 +6,8 @@ use motion::{ClPoint, Move, Toolpath};
 use std::cell::Cell;
 use work::parallel;
 
-/// A solid that keeps its distance from an obstacle: a cutter from the part and from fixtures, a holder from both.
+/// A solid that keeps its distance from an obstacle: a cutter from the part and from fixtures, a holder from
+/// both.
 #[derive(Debug, Clone, Copy)]
 pub struct Check<'a> {
     /// Part of the tool.
@@ -41,13 +42,14 @@ pub struct Shortfall {
     pub nearest: Clearance,
 }
 
-/// What refused a location last: a check, a piece of its solid and a triangle. It is asked first at the next one, which is mostly
-/// near and refused by the same; no answer depends on it.
+/// What refused a location last: a check, a piece of its solid and a triangle. It is asked first at the next
+/// one, which is mostly near and refused by the same; no answer depends on it.
 #[derive(Debug, Clone, Default)]
 pub struct LastRefusal(Cell<Option<(usize, (usize, usize))>>);
 
-/// Distance kept beyond what is needed by locations that are repaired, mm, and the share of the allowed depth for those
-/// that may cut in: moves between such locations are then clear too. More tilts more than necessary, less takes more points.
+/// Distance kept beyond what is needed by locations that are repaired, mm, and the share of the allowed depth
+/// for those that may cut in: moves between such locations are then clear too. More tilts more than
+/// necessary, less takes more points.
 const SPARE: f64 = 0.02;
 const SPARE_SHARE: f64 = 0.5;
 
@@ -111,7 +113,8 @@ impl Interference<'_> {
         worst(self.checks.iter().enumerate().filter_map(one))
     }
 
-    /// The moves of a path, of those that `chosen` picks, on which a check fails, with the one that fails by most.
+    /// The moves of a path, of those that `chosen` picks, on which a check fails, with the one that fails by
+    /// most.
     pub fn on_path(
         &self,
         path: &Toolpath,

@@ -1,7 +1,8 @@
 //! The least distance between a tool or another body and a mesh on a whole path.
 //!
-//! Enters: a solid, a path, an obstacle. Leaves: the move and the place where they come nearest, with a bound, mm. A bound
-//! on the whole is known from a few locations before the search begins, so that most moves are settled by one look.
+//! Enters: a solid, a path, an obstacle. Leaves: the move and the place where they come nearest, with a
+//! bound, mm. A bound on the whole is known from a few locations before the search begins, so that most moves
+//! are settled by one look.
 
 use cutter::Solid;
 use motion::{Move, Toolpath};
@@ -12,8 +13,8 @@ use super::piece::Convex;
 use super::sweep::{Moving, RESOLUTION, ToolMove};
 use super::{Clearance, Obstacle};
 
-/// Locations of the path at which the tool is looked at first. More cost a full search each, fewer leave more moves to
-/// look at closely.
+/// Locations of the path at which the tool is looked at first. More cost a full search each, fewer leave more
+/// moves to look at closely.
 const FIRST_LOOKS: usize = 64;
 
 /// Moves that one worker looks at on its own. Each worker begins with what the first looks found.
@@ -22,8 +23,8 @@ const CHUNK_MOVES: usize = 1024;
 /// Looks at one move at most. Each leaves a hundredth of what it found to be missing.
 const MOST_LOOKS: usize = 20;
 
-/// A tool that is in the mesh is followed to where it is deeper by this share, and by this length, mm, and no further: the
-/// program is refused anyway, and many places of a tool that ploughs are about as deep.
+/// A tool that is in the mesh is followed to where it is deeper by this share, and by this length, mm, and no
+/// further: the program is refused anyway, and many places of a tool that ploughs are about as deep.
 const DEEPER_SHARE: f64 = 0.1;
 const DEEPER: f64 = 0.001;
 
@@ -36,14 +37,14 @@ pub struct LeastClearance {
     pub t: f64,
     /// How near, and where on the mesh.
     pub nearest: Clearance,
-    /// No other time of the path is nearer by more than this, mm. Of a tool in the mesh it is a tenth of the depth and more,
-    /// and infinite where even that is left open.
+    /// No other time of the path is nearer by more than this, mm. Of a tool in the mesh it is a tenth of the
+    /// depth and more, and infinite where even that is left open.
     pub error_bound: f64,
 }
 
 impl Obstacle<'_> {
-    /// The least signed distance between `solid` and the mesh on the moves of `path` that `chosen` picks; `None` without
-    /// such moves.
+    /// The least signed distance between `solid` and the mesh on the moves of `path` that `chosen` picks;
+    /// `None` without such moves.
     ///
     /// A tool that begins wholly inside a closed mesh is as deep in it as its tip.
     ///

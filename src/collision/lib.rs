@@ -1,17 +1,20 @@
-//! Where a tool or a body of the machine touches what it should not: the part away from the contact, neighbours, fixtures.
+//! Where a tool or a body of the machine touches what it should not: the part away from the contact,
+//! neighbours, fixtures.
 //!
-//! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm. Leaves: the
-//! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]),
-//! a whole move ([`Obstacle::swept_clearance`]) or a whole path ([`Obstacle::least_clearance`]). Boxes and cylinders of a machine
-//! move in any way ([`Obstacle::least_clearance_of_body`]).
+//! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm.
+//! Leaves: the nearest place of the meshes with its signed distance from the tool, for one location
+//! ([`Obstacle::clearance`]), a whole move ([`Obstacle::swept_clearance`]) or a whole path
+//! ([`Obstacle::least_clearance`]). Boxes and cylinders of a machine move in any way
+//! ([`Obstacle::least_clearance_of_body`]).
 //!
-//! The distance from a convex piece is convex, so its gradient supports it over a box, a triangle and a stretch of a move. A
-//! tool that slides along a surface comes no nearer by its motion: its supporting plane moves along itself. A bound by speed
-//! alone would need far more looks. Cutter and holder are checked apart, because a cutter may cut in by a tolerance.
+//! The distance from a convex piece is convex, so its gradient supports it over a box, a triangle and a
+//! stretch of a move. A tool that slides along a surface comes no nearer by its motion: its supporting plane
+//! moves along itself. A bound by speed alone would need far more looks. Cutter and holder are checked apart,
+//! because a cutter may cut in by a tolerance.
 //!
-//! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none of it. It
-//! reached that position through the surface, and the move that did so is reported, or it began there
-//! ([`Obstacle::least_clearance`]).
+//! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none
+//! of it. It reached that position through the surface, and the move that did so is reported, or it began
+//! there ([`Obstacle::least_clearance`]).
 
 mod body;
 mod checks;
@@ -66,8 +69,8 @@ impl<'a> Obstacle<'a> {
     /// The nearest place of the mesh, if it is nearer than `limit`, mm, to a tool standing at `at`.
     ///
     /// # Tolerance
-    /// The distance is the least of the whole mesh to 1e-9 mm. Inside of a solid of several pieces it is the depth in
-    /// the piece in which a place lies deepest; what adjoining pieces add to it is not counted.
+    /// The distance is the least of the whole mesh to 1e-9 mm. Inside of a solid of several pieces it is the
+    /// depth in the piece in which a place lies deepest; what adjoining pieces add to it is not counted.
     pub fn clearance(&self, solid: &Solid, at: &ClPoint, limit: f64) -> Option<Clearance> {
         let mut best = None;
         for index in 0..solid.pieces() {
@@ -115,7 +118,8 @@ impl<'a> Obstacle<'a> {
     }
 }
 
-/// Minus a lower bound on the distance of a box: what the supporting plane at its middle leaves over its sides.
+/// Minus a lower bound on the distance of a box: what the supporting plane at its middle leaves over its
+/// sides.
 fn farthest<P: Convex>(piece: &P) -> impl Fn(usize, &Node, f64) -> f64 {
     |_, node, _| {
         let (middle, half) = node.middle();

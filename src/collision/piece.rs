@@ -1,24 +1,25 @@
 //! One convex piece of a tool or of a machine that stands somewhere, and its least distance from a triangle.
 //!
 //! The signed distance `d` is a convex function of the place, so that its gradient g at p supports it:
-//! `d(q) >= d(p) + g·(q − p)`. Where the least of a triangle's plane lies off the triangle, a side between the two holds the
-//! least of the triangle. Of a solid of revolution `d` is over a plane symmetric about the plane through the axis square to it,
-//! hence least in that one: the least of a plane is the least along a line. Of a box it has a closed form. Lines are searched
-//! between two supporting lines whose crossing bounds the least from below.
+//! `d(q) >= d(p) + g·(q − p)`. Where the least of a triangle's plane lies off the triangle, a side between
+//! the two holds the least of the triangle. Of a solid of revolution `d` is over a plane symmetric about the
+//! plane through the axis square to it, hence least in that one: the least of a plane is the least along a
+//! line. Of a box it has a closed form. Lines are searched between two supporting lines whose crossing bounds
+//! the least from below.
 
 use cutter::Solid;
 use geometry::{Point3, Vector3};
 use motion::ClPoint;
 
-/// How far above the true one a least distance may lie, mm; each triangle takes two such searches. Less is lost in
-/// rounding, more shows in what depends on 1e-9.
+/// How far above the true one a least distance may lie, mm; each triangle takes two such searches. Less is
+/// lost in rounding, more shows in what depends on 1e-9.
 const TOLERANCE: f64 = 2.5e-10;
 
 /// Steps along a line at most. A dozen suffice; what is left then is rounding.
 const MOST_STEPS: usize = 100;
 
-/// A tool axis nearer than this (sine) to the normal of a plane is square to it: then every direction is as good, and
-/// costs less than this times the size of the tool.
+/// A tool axis nearer than this (sine) to the normal of a plane is square to it: then every direction is as
+/// good, and costs less than this times the size of the tool.
 const SQUARE: f64 = 1e-12;
 
 /// One convex piece of a tool at a location.
@@ -62,11 +63,13 @@ pub trait Convex: Copy {
     /// It lies within this of its origin along the unit vector `u`.
     fn support(&self, u: &Vector3) -> f64;
 
-    /// The nearest place of the plane of a triangle with the unit normal `normal`, if it can lie on the triangle.
+    /// The nearest place of the plane of a triangle with the unit normal `normal`, if it can lie on the
+    /// triangle.
     fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<NearPlace>;
 
-    /// The unit normal of a triangle, toward the side from which the piece can be farther away, and the signed distance of
-    /// its plane from the piece: no place of the triangle is nearer. Unlike a gradient it is good beside sharp edges too.
+    /// The unit normal of a triangle, toward the side from which the piece can be farther away, and the
+    /// signed distance of its plane from the piece: no place of the triangle is nearer. Unlike a gradient it
+    /// is good beside sharp edges too.
     fn off_plane(&self, corners: &[Point3; 3]) -> (Vector3, f64) {
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
         let off = |u: Vector3| (u, u.dot(&(corners[0] - self.origin())) - self.support(&u));

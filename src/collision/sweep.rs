@@ -1,9 +1,10 @@
 //! How near a tool comes to a mesh on a move.
 //!
-//! Seen from the tool a place q runs along a curve with the velocity `−(v + Ω×w)` and an acceleration of at most
-//! `2|Ω×v| + |Ω||Ω×w|`, w its way from the tip. The supporting plane at one time and one place therefore bounds the
-//! distance of all places of a box, or of a triangle, over a stretch of time from below: a surface that the tool slides
-//! along is no nearer for that, since it moves along the plane. Stretches that this does not settle are halved.
+//! Seen from the tool a place q runs along a curve with the velocity `−(v + Ω×w)` and an acceleration of at
+//! most `2|Ω×v| + |Ω||Ω×w|`, w its way from the tip. The supporting plane at one time and one place therefore
+//! bounds the distance of all places of a box, or of a triangle, over a stretch of time from below: a surface
+//! that the tool slides along is no nearer for that, since it moves along the plane. Stretches that this does
+//! not settle are halved.
 
 use super::piece::{Convex, ToolPiece, middle};
 use super::{Clearance, Obstacle};
@@ -12,15 +13,15 @@ use geometry::{Node, Point3, Vector3};
 use motion::ClPoint;
 use std::collections::VecDeque;
 
-/// A move counts as clear when nothing comes nearer than what is needed less this, mm. Less costs time where a tool slides
-/// along a surface at just the distance that is needed.
+/// A move counts as clear when nothing comes nearer than what is needed less this, mm. Less costs time where
+/// a tool slides along a surface at just the distance that is needed.
 pub(crate) const RESOLUTION: f64 = 1e-5;
 
 /// The worst of a move is found to this share of what is missing.
 const SHARE: f64 = 0.01;
 
-/// Stretches of a move that are looked at once a place that is too near is known. A tool that ploughs along below the surface
-/// is as deep at most times as it ever can be, and to tell the deepest would take for ever.
+/// Stretches of a move that are looked at once a place that is too near is known. A tool that ploughs along
+/// below the surface is as deep at most times as it ever can be, and to tell the deepest would take for ever.
 const MOST_LOOKS: usize = 100;
 
 /// Axes are opposite when this close to it, rad.
@@ -43,7 +44,8 @@ pub(crate) trait Moving {
     fn pieces(&self) -> usize;
     /// A piece at a time from 0 to 1.
     fn piece(&self, index: usize, t: f64) -> Self::Piece;
-    /// Way of the origin, and turn, over the whole move, mm and rad. `None` where it turns to the opposite, any way round.
+    /// Way of the origin, and turn, over the whole move, mm and rad. `None` where it turns to the opposite,
+    /// any way round.
     fn course(&self) -> Option<[Vector3; 2]>;
 }
 
@@ -87,12 +89,14 @@ struct Stretch<P> {
 }
 
 impl Obstacle<'_> {
-    /// The nearest place of the mesh on a move of a tool ([`ClPoint::towards`]), if it is nearer than `needed` (finite), mm.
+    /// The nearest place of the mesh on a move of a tool ([`ClPoint::towards`]), if it is nearer than
+    /// `needed` (finite), mm.
     ///
     /// # Tolerance
-    /// What is told comes as near as told. `None` proves that nothing comes nearer than `needed` less 1e-5 mm. No other time is
-    /// nearer than the one told by more than that or a hundredth of what is missing, unless it takes more than a hundred
-    /// looks to find it: then it is the worst of these. Which way an axis turns to its opposite is not told: nearer than anything.
+    /// What is told comes as near as told. `None` proves that nothing comes nearer than `needed` less 1e-5
+    /// mm. No other time is nearer than the one told by more than that or a hundredth of what is missing,
+    /// unless it takes more than a hundred looks to find it: then it is the worst of these. Which way an axis
+    /// turns to its opposite is not told: nearer than anything.
     pub fn swept_clearance(
         &self,
         solid: &Solid,
@@ -157,7 +161,8 @@ impl Obstacle<'_> {
 }
 
 impl<P: Convex> Stretch<P> {
-    /// How much a place may move against `gradient`, mm; `beside` is how far others that are asked for lie from it.
+    /// How much a place may move against `gradient`, mm; `beside` is how far others that are asked for lie
+    /// from it.
     fn moved(&self, gradient: &Vector3, q: &Point3, beside: f64) -> f64 {
         let turning = self.spin.cross(&(q - self.piece.origin()));
         let pace = self.spin.cross(&self.way).norm();
@@ -177,7 +182,8 @@ impl<P: Convex> Stretch<P> {
         sample.distance - sides - self.moved(&g, &middle, size)
     }
 
-    /// As [`Obstacle::may_come_nearer`], for one triangle. It is divided until the time costs more than its size.
+    /// As [`Obstacle::may_come_nearer`], for one triangle. It is divided until the time costs more than its
+    /// size.
     fn may_come_nearer(&self, corners: &[Point3; 3], limit: f64) -> bool {
         let centre = middle(corners);
         let sample = self.piece.sample(&centre);

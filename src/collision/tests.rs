@@ -94,8 +94,8 @@ fn brute_force_by_division_finds_the_same() {
     assert!((300..1700).contains(&inside), "{inside} of 2000 inside");
 }
 
-/// Least over a triangle by dividing it: what lies above the least found, by the distance growing no faster than the
-/// way, is left out.
+/// Least over a triangle by dividing it: what lies above the least found, by the distance growing no faster
+/// than the way, is left out.
 fn brute(d: &dyn Fn(&Point3) -> f64, corners: &[Point3; 3]) -> f64 {
     let mut waiting = vec![*corners];
     let mut least = f64::INFINITY;

@@ -67,7 +67,8 @@ impl Cutter {
         self.axis_offset_from(n, NEARLY_LEVEL)
     }
 
-    /// As [`Cutter::axis_offset`] where ground counts as nearly level below the slope (sine) `level`, within what it takes there.
+    /// As [`Cutter::axis_offset`] where ground counts as nearly level below the slope (sine) `level`, within
+    /// what it takes there.
     pub fn axis_offset_from(&self, n: &Vector3, level: f64) -> Vector2 {
         let level = level.clamp(LEAST_LEVEL, NEARLY_LEVEL);
         let (plan, profile) = (n.xy(), self.profile());
@@ -99,9 +100,9 @@ impl Cutter {
     }
 
     /// From the contact with a surface of outward unit normal `n` to the tip of a cutter along the unit
-    /// `axis`: on the arc `r n + (R − r) e − r a`, with e the unit part of n square to the axis and R − r the distance
-    /// of the arc's centre from it. Unlike [`Cutter::contact_to_tip`] exact for the least lean: a flat leaning by a
-    /// hair stands on its rim. Square to the surface it is centred over the contact.
+    /// `axis`: on the arc `r n + (R − r) e − r a`, with e the unit part of n square to the axis and R − r the
+    /// distance of the arc's centre from it. Unlike [`Cutter::contact_to_tip`] exact for the least lean: a
+    /// flat leaning by a hair stands on its rim. Square to the surface it is centred over the contact.
     pub fn contact_to_tip_along(&self, n: &Vector3, axis: &Vector3) -> Vector3 {
         let profile = self.profile();
         let outward = n - axis * n.dot(axis);

@@ -57,7 +57,8 @@ impl Cutter {
         Some(key.of(self))
     }
 
-    /// Its word and dimensions in one word, `ball:6`: as the command line takes it, rounded to four decimals, mm and degrees.
+    /// Its word and dimensions in one word, `ball:6`: as the command line takes it, rounded to four decimals,
+    /// mm and degrees.
     pub fn short_name(&self) -> String {
         let family = self.family();
         let rounded = |key: &CutterKey| (key.of(self) * 1e4).round() / 1e4;

@@ -374,8 +374,8 @@ impl Solid {
         self.pieces.get(piece).unwrap_or(&self.outline).foot(rho, z)
     }
 
-    /// How far one of its convex pieces reaches from the tip along a unit vector with the parts `across >= 0` square to
-    /// the axis and `along` it, mm: its support function.
+    /// How far one of its convex pieces reaches from the tip along a unit vector with the parts `across >= 0`
+    /// square to the axis and `along` it, mm: its support function.
     #[inline]
     pub fn piece_support(&self, piece: usize, across: f64, along: f64) -> f64 {
         self.pieces.get(piece).unwrap_or(&self.outline).support([across, along])

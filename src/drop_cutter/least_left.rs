@@ -8,7 +8,8 @@ use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// The least height, mm along the normal, that an upright cutter leaves above a place without cutting into the part.
+/// The least height, mm along the normal, that an upright cutter leaves above a place without cutting into
+/// the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastLeft {
     /// What the best position that was found leaves.
@@ -43,11 +44,12 @@ const SEARCHED: usize = 60;
 /// A line that misses the cutter by so little, mm, counts as meeting it.
 const GRAZED: f64 = 1e-9;
 
-/// Positions that meet the line above a place no further up than so many times what is to be proven are looked at.
+/// Positions that meet the line above a place no further up than so many times what is to be proven are
+/// looked at.
 const AS_FAR: f64 = 2.0;
 
-/// Eight places at so many mm along the axes and the diagonals: a cutter that stands on the part at two places comes lower only between
-/// the ways on which it leaves one of them.
+/// Eight places at so many mm along the axes and the diagonals: a cutter that stands on the part at two
+/// places comes lower only between the ways on which it leaves one of them.
 fn around(at: Point2, step: f64) -> impl Iterator<Item = Point2> {
     let offsets = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
     offsets.filter(|offset| *offset != Vector2::zeros()).map(move |offset| at + offset * step)
@@ -58,9 +60,10 @@ const RINGS: usize = 3;
 const ON_RING: usize = 8;
 
 impl DropCutter<'_> {
-    /// What the best position of `cutter`, which this was made for, that a search from a few finds leaves above the place `at` of the
-    /// part, with its unit normal, mm along z: no less than [`Self::least_left`] finds. Infinite where none of them touches the part. The
-    /// search ends where no more than `enough` is left.
+    /// What the best position of `cutter`, which this was made for, that a search from a few finds leaves
+    /// above the place `at` of the part, with its unit normal, mm along z: no less than [`Self::least_left`]
+    /// finds. Infinite where none of them touches the part. The search ends where no more than `enough` is
+    /// left.
     pub fn left_by_search(&self, cutter: &Cutter, at: &Point3, normal: &Vector3, enough: f64) -> f64 {
         let leaves = |axis: Point2| self.left_from(cutter, at, axis).unwrap_or(f64::INFINITY);
         let touching = at.xy() + cutter.axis_offset(normal);
@@ -79,16 +82,17 @@ impl DropCutter<'_> {
         best.map_or(f64::INFINITY, |(_, axis)| leaves(self.lowest_over(cutter, at, axis, 0.5 * spacing)))
     }
 
-    /// What `cutter`, which this was made for, leaves above the place `at` from an axis, mm along z; `None` where it does not cover the
-    /// place or touches no part.
+    /// What `cutter`, which this was made for, leaves above the place `at` from an axis, mm along z; `None`
+    /// where it does not cover the place or touches no part.
     fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2) -> Option<f64> {
         let height = cutter.height((axis - at.xy()).norm())?;
         Some(self.at(axis.x, axis.y)?.tip_z + height - at.z)
     }
 
-    /// The axis, mm, near `first` from which `cutter`, which this was made for, leaves least above the place `at` of the part: a
-    /// search by ever smaller steps, the first of them `step` mm. Where the cutter cannot touch the place, since it stands on the
-    /// part elsewhere, another position near the one that would touch it leaves less.
+    /// The axis, mm, near `first` from which `cutter`, which this was made for, leaves least above the place
+    /// `at` of the part: a search by ever smaller steps, the first of them `step` mm. Where the cutter cannot
+    /// touch the place, since it stands on the part elsewhere, another position near the one that would touch
+    /// it leaves less.
     pub fn lowest_over(&self, cutter: &Cutter, at: &Point3, first: Point2, step: f64) -> Point2 {
         let leaves = |axis: &Point2| self.left_from(cutter, at, *axis).unwrap_or(f64::INFINITY);
         let (mut best, mut step) = ((leaves(&first), first), step);
@@ -105,11 +109,12 @@ impl DropCutter<'_> {
         best.1
     }
 
-    /// What `cutter`, which this was made for, leaves at least above the place `at` of the part along its unit normal, which looks up;
-    /// `None` where that is not proven to be more than `more_than`, mm.
+    /// What `cutter`, which this was made for, leaves at least above the place `at` of the part along its
+    /// unit normal, which looks up; `None` where that is not proven to be more than `more_than`, mm.
     ///
-    /// A branch and bound over all positions that cover the place, or the line above it as far as `more_than`. A cutter that touches the
-    /// part at a contact comes no lower than this contact from any position nearby, either; that bounds a whole square.
+    /// A branch and bound over all positions that cover the place, or the line above it as far as
+    /// `more_than`. A cutter that touches the part at a contact comes no lower than this contact from any
+    /// position nearby, either; that bounds a whole square.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -143,7 +148,8 @@ impl DropCutter<'_> {
                 let carried = |z: f64, rho: f64| z - height(rho + corner);
                 let rho = away(contact.x, contact.y);
                 let mut tip = carried(contact.z, rho);
-                // The rim of a flat leaves the contact at once; a place of the part a little further in stays below it.
+                // The rim of a flat leaves the contact at once; a place of the part a little further in stays
+                // below it.
                 let inner = (radius - corner).min(rho);
                 if rho + corner > radius && inner > 0.0 {
                     let along = |from: f64, to: f64| from + (to - from) * inner / rho;
@@ -187,8 +193,9 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
-    /// How far along the line it meets a cutter whose tip is at that height, or one nearer to the line by up to `aside`; infinite where it
-    /// does not, or beyond the radius from the place. Never more than that by more than rounding.
+    /// How far along the line it meets a cutter whose tip is at that height, or one nearer to the line by up
+    /// to `aside`; infinite where it does not, or beyond the radius from the place. Never more than that by
+    /// more than rounding.
     fn left(&self, tip: f64, [x, y]: [f64; 2], aside: f64) -> f64 {
         let gap = |t: f64| {
             let q = self.at + self.normal * t;
@@ -280,8 +287,8 @@ mod tests {
             .unwrap()
     }
 
-    /// In the middle of a hollow cylinder of 30 mm a flat of 1.5 mm in radius rests on its corner: the closed form of the
-    /// section. A ball and a short flat reach the ground.
+    /// In the middle of a hollow cylinder of 30 mm a flat of 1.5 mm in radius rests on its corner: the closed
+    /// form of the section. A ball and a short flat reach the ground.
     #[test]
     fn a_flat_stands_above_the_ground_of_a_hollow() {
         let hollow = |x: f64, _: f64| 30.0 - (900.0 - (x - 6.0).powi(2)).sqrt();
@@ -302,8 +309,8 @@ mod tests {
         assert_eq!(left(&bull, [6.0, 6.0], 1.01 * (stands + chord), hollow), None);
     }
 
-    /// At the foot of a steep wall on a slope of 40 degrees a ball stands on both. What it leaves is steeper than the slope there: along the
-    /// normal it is less than along z times the normal's z.
+    /// At the foot of a steep wall on a slope of 40 degrees a ball stands on both. What it leaves is steeper
+    /// than the slope there: along the normal it is less than along z times the normal's z.
     #[test]
     fn heights_are_those_along_the_normal() {
         let [slope, wall] = [40f64, 65.0].map(f64::to_radians);
@@ -327,7 +334,8 @@ mod tests {
         assert!((upright.height - upright.bound) * normal.z > 1.2 * stands, "{upright:?} {stands}");
     }
 
-    /// From beside the best position the search comes to it: in a hollow a cutter that rests on its corner leaves least over its middle.
+    /// From beside the best position the search comes to it: in a hollow a cutter that rests on its corner
+    /// leaves least over its middle.
     #[test]
     fn the_best_position_is_found_from_beside() {
         let hollow = |x: f64, y: f64| 2e-3 * ((x - 6.0).powi(2) + 0.5 * (y - 6.0).powi(2));

@@ -1,11 +1,11 @@
 //! A tilted bound above the triangles in one box of the search tree.
 //!
-//! On a slope a level box ends far above the surface, and most of what a drop tests it tests in
-//! vain. A plane tilted like the surface lies closely above it; how high the cutter can come to rest
-//! on what is below that plane and inside the box has a closed form again.
+//! On a slope a level box ends far above the surface, and most of what a drop tests it tests in vain. A plane
+//! tilted like the surface lies closely above it; how high the cutter can come to rest on what is below that
+//! plane and inside the box has a closed form again.
 //!
-//! The bounds are over the tessellation itself and not over the domains of its triangles. Every triangle that the cutter may
-//! touch has to be refined on the exact surface, not only the highest one.
+//! The bounds are over the tessellation itself and not over the domains of its triangles. Every triangle that
+//! the cutter may touch has to be refined on the exact surface, not only the highest one.
 
 use super::touch::{Profile, Rest, gap};
 use geometry::{Node, Point3, Vector3, round_down, round_up};

@@ -1,10 +1,12 @@
 //! Stream functions from directions by finite differences on an even grid.
 //!
-//! Enters: what is asked of ∇ψ in each cell, in parameters. Leaves: the least-squares ψ at the nodes, as a [`GridField`]; of
-//! second order in the size h of the cells in the mean, h² log(1/h) in the corners of the rectangle. Natural boundary
-//! conditions come by themselves, since the discrete energy itself is made least; the open constant is fixed by a mean of 0.
+//! Enters: what is asked of ∇ψ in each cell, in parameters. Leaves: the least-squares ψ at the nodes, as a
+//! [`GridField`]; of second order in the size h of the cells in the mean, h² log(1/h) in the corners of the
+//! rectangle. Natural boundary conditions come by themselves, since the discrete energy itself is made least;
+//! the open constant is fixed by a mean of 0.
 //!
-//! The stream function is that of the `fit` module, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks for one cell.
+//! The stream function is that of the `fit` module, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks
+//! for one cell.
 //!
 //! Solvers: CG with a multigrid cycle; sparse Cholesky and GMRES to compare.
 

@@ -86,9 +86,9 @@ pub(super) fn orient_along<N: Iterator<Item = usize>>(
     }
 }
 
-/// The squares of a grid `[n][n]` of lines around which the field turns: their corners and the number of half turns,
-/// counter-clockwise. `lines` are tangents in a frame that turns little from place to place; where one is missing nothing
-/// is found. More than one half turn may be found in several squares side by side.
+/// The squares of a grid `[n][n]` of lines around which the field turns: their corners and the number of half
+/// turns, counter-clockwise. `lines` are tangents in a frame that turns little from place to place; where one
+/// is missing nothing is found. More than one half turn may be found in several squares side by side.
 pub fn grid_turns(lines: &[Option<[f64; 2]>], n: usize) -> Vec<([usize; 4], i32)> {
     let double = |k: usize| lines.get(k).copied().flatten().map(|[x, y]| 2.0 * y.atan2(x));
     let turn = |corners: [usize; 4]| {
@@ -163,8 +163,8 @@ mod tests {
             let lines: Vec<_> = lines.iter().map(|l| l.map(|(t, _)| [t.x, t.y])).collect();
             let found = grid_turns(&lines, 20);
             assert_eq!(found.iter().map(|f| f.1).sum::<i32>(), half_turns, "{found:?}");
-            // Places are (k − 9.7, l − 9.6). More than a half turn is more than four places can tell, and is found in
-            // several squares side by side.
+            // Places are (k − 9.7, l − 9.6). More than a half turn is more than four places can tell, and is
+            // found in several squares side by side.
             let near = |k: &usize| (8..=11).contains(&(k % 20)) && (8..=11).contains(&(k / 20));
             assert!(found.iter().all(|f| f.0.iter().all(near)), "{found:?}");
         }

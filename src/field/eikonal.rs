@@ -1,21 +1,23 @@
-//! Fronts that move over a surface: `speed(∇φ/|∇φ|) |∇_S φ| = 1`, φ = 0 on a start curve (a static Hamilton–Jacobi
-//! equation, anisotropic since the speed depends on the direction across the front).
+//! Fronts that move over a surface: `speed(∇φ/|∇φ|) |∇_S φ| = 1`, φ = 0 on a start curve (a static
+//! Hamilton–Jacobi equation, anisotropic since the speed depends on the direction across the front).
 //!
-//! Enters: the first fundamental form and the speed by direction at any place of a parameter rectangle; start curves as
-//! polylines in parameters. Leaves: φ on an even grid. With the strip width as the speed φ counts passes, and its
-//! levels 1 apart are passes that are everywhere exactly one strip apart.
+//! Enters: the first fundamental form and the speed by direction at any place of a parameter rectangle; start
+//! curves as polylines in parameters. Leaves: φ on an even grid. With the strip width as the speed φ counts
+//! passes, and its levels 1 apart are passes that are everywhere exactly one strip apart.
 //!
-//! Method: fast sweeping over the four quadrants (Zhao 2005; Qian, Zhang & Zhao 2007 for anisotropic fronts), where a
-//! front is taken from the two neighbours of a quadrant only if its energy comes out of that quadrant; then sweeps with
-//! one-sided differences of second order, except across kinks (where fronts from two sides meet), which the first
-//! solution shows. After some rounds each node keeps the quadrant that it has, so that the sweeps settle. Second order
-//! where φ is smooth; first order in the circles that points and ends of open start curves send out.
+//! Method: fast sweeping over the four quadrants (Zhao 2005; Qian, Zhang & Zhao 2007 for anisotropic fronts),
+//! where a front is taken from the two neighbours of a quadrant only if its energy comes out of that
+//! quadrant; then sweeps with one-sided differences of second order, except across kinks (where fronts from
+//! two sides meet), which the first solution shows. After some rounds each node keeps the quadrant that it
+//! has, so that the sweeps settle. Second order where φ is smooth; first order in the circles that points and
+//! ends of open start curves send out.
 //!
 //! # Limits
 //! The front's polar diagram of slowness 1/speed must be convex for the solution to be unique: for a ball,
-//! `(κ_cutter − κ_min) ≤ 2 (κ_cutter − κ_max)`. Beyond it fronts may have corners of their own; the interval is still
-//! that which the speed says, except in the fans behind such corners, where it is smaller. Where they break into corners without
-//! end the sweeps do not settle: most [`Front::convex`] fronts do, and all do in first order.
+//! `(κ_cutter − κ_min) ≤ 2 (κ_cutter − κ_max)`. Beyond it fronts may have corners of their own; the interval
+//! is still that which the speed says, except in the fans behind such corners, where it is smaller. Where
+//! they break into corners without end the sweeps do not settle: most [`Front::convex`] fronts do, and all do
+//! in first order.
 
 mod front;
 #[cfg(test)]
@@ -26,30 +28,35 @@ pub use front::Front;
 use super::GridField;
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Rounds of four sweeps at most, for each of the two orders. Some ten are enough unless characteristics wind.
+/// Rounds of four sweeps at most, for each of the two orders. Some ten are enough unless characteristics
+/// wind.
 const MOST_ROUNDS: usize = 60;
 
-/// Sweeps end when no node changes by more than this share of the greatest φ. Rounding would keep less from being reached.
+/// Sweeps end when no node changes by more than this share of the greatest φ. Rounding would keep less from
+/// being reached.
 const SETTLED: f64 = 1e-10;
 
-/// A change of φ above this share of its greatest value in first order is no correction: the sweeps have gone astray.
+/// A change of φ above this share of its greatest value in first order is no correction: the sweeps have gone
+/// astray.
 const ASTRAY: f64 = 0.5;
 
-/// Rounds after which each node keeps its quadrant. Fewer may keep that of a poor first order, more settle later.
+/// Rounds after which each node keeps its quadrant. Fewer may keep that of a poor first order, more settle
+/// later.
 const CHOOSING_ROUNDS: usize = 3;
 
-/// A bend of φ over three nodes is taken for a kink above this share of its greatest change from node to node. More
-/// would take differences across kinks, less those of first order where fronts are curved within few nodes.
+/// A bend of φ over three nodes is taken for a kink above this share of its greatest change from node to
+/// node. More would take differences across kinks, less those of first order where fronts are curved within
+/// few nodes.
 const KINK: f64 = 0.5;
 
-/// Cells around a piece of a start curve whose nodes may have their nearest place on it. Fewer miss it where parameters
-/// are skewed.
+/// Cells around a piece of a start curve whose nodes may have their nearest place on it. Fewer miss it where
+/// parameters are skewed.
 const AROUND: f64 = 2.0;
 
 const QUADRANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
 
-/// Two sides of a signed front meet only on the start curve: elsewhere a neighbour of the other side whose φ is further
-/// off than this many steps of the grid is across a cut of φ.
+/// Two sides of a signed front meet only on the start curve: elsewhere a neighbour of the other side whose φ
+/// is further off than this many steps of the grid is across a cut of φ.
 const ACROSS_THE_CURVE: f64 = 4.0;
 
 /// Why no front could be moved.
@@ -72,10 +79,11 @@ pub enum EikonalError {
 /// Where a front starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start<'a> {
-    /// Polylines in parameters; one of a single point is a point source. Points beyond the domain are allowed.
+    /// Polylines in parameters; one of a single point is a point source. Points beyond the domain are
+    /// allowed.
     pub curves: &'a [Vec<[f64; 2]>],
-    /// φ is negative on the right of the curves (seen along them, with u to the right and v up). The curves should part
-    /// the domain; where they end inside of it, φ jumps on a line from their end.
+    /// φ is negative on the right of the curves (seen along them, with u to the right and v up). The curves
+    /// should part the domain; where they end inside of it, φ jumps on a line from their end.
     pub signed: bool,
 }
 
@@ -84,21 +92,22 @@ pub struct Start<'a> {
 pub struct Arrival {
     /// φ.
     pub field: GridField,
-    /// Greatest change of φ in the last round of sweeps: what is left of the iteration's error. Infinite where the sweeps
-    /// went astray.
+    /// Greatest change of φ in the last round of sweeps: what is left of the iteration's error. Infinite
+    /// where the sweeps went astray.
     pub unsettled: f64,
     /// φ by differences of first order, which settles for every front.
     pub first_order: GridField,
 }
 
-/// Moves a front over a grid of `nodes = [nu, nv]` on `domain`. `front(u, v)` gives metric and speed there; places where
-/// it gives none take those of the nearest node that has them.
+/// Moves a front over a grid of `nodes = [nu, nv]` on `domain`. `front(u, v)` gives metric and speed there;
+/// places where it gives none take those of the nearest node that has them.
 ///
 /// # Errors
 /// See [`EikonalError`].
 ///
 /// # Tolerance
-/// The discretisation error is of second order in the pitch, see above; that of the iteration is in the answer.
+/// The discretisation error is of second order in the pitch, see above; that of the iteration is in the
+/// answer.
 pub fn eikonal(
     domain: [[f64; 2]; 2],
     nodes: [usize; 2],
@@ -254,8 +263,8 @@ impl Sweeper {
             let [s0, s1] = [k, k + 1].map(|k| k as f64 / parts as f64);
             let (p, q) = (part(s0), part(s1));
             let (cp, cq) = (cell(p), cell(q));
-            // Nodes of the cells that the part touches, also those on the two sides of a line of the grid, and more
-            // around, whose nearest place it may hold.
+            // Nodes of the cells that the part touches, also those on the two sides of a line of the grid,
+            // and more around, whose nearest place it may hold.
             let range = |c: usize, more: f64| {
                 let lo = (cp[c].min(cq[c]) - 1e-9).floor() - more;
                 let hi = (cp[c].max(cq[c]) + 1e-9).ceil() + more;
@@ -282,7 +291,8 @@ impl Sweeper {
         }
     }
 
-    /// How the part from `p` to `q` reaches node `k`; `ends` says which of its ends are ends of the whole curve.
+    /// How the part from `p` to `q` reaches node `k`; `ends` says which of its ends are ends of the whole
+    /// curve.
     fn nearest(
         &self,
         k: usize,
@@ -314,10 +324,12 @@ impl Sweeper {
         [0, 1].map(|c| self.origin[c] + self.pitch[c] * at[c] as f64)
     }
 
-    /// Sweeps until nothing changes; returns the greatest change of the last round. In the first order values only fall.
+    /// Sweeps until nothing changes; returns the greatest change of the last round. In the first order values
+    /// only fall.
     fn settle(&mut self, order: Order, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let mut change = 0.0;
-        // When a node was last looked at and last changed, in sweeps: a node whose neighbours stand still is passed over.
+        // When a node was last looked at and last changed, in sweeps: a node whose neighbours stand still is
+        // passed over.
         self.looked = vec![0; self.value.len()];
         self.changed = vec![1; self.value.len()];
         let mut sweep = 1;
@@ -425,8 +437,8 @@ impl Sweeper {
         (self.fronts[k].arrival(self.pitch, toward, known), side[earlier])
     }
 
-    /// Arrival by one-sided differences of second order, and the choice (quadrant and neighbours) that it is by: the
-    /// smallest of all choices, or that of the choice given.
+    /// Arrival by one-sided differences of second order, and the choice (quadrant and neighbours) that it is
+    /// by: the smallest of all choices, or that of the choice given.
     fn second_order(&self, k: usize, chosen: Option<Choice>) -> (f64, Option<Choice>) {
         let mut best = (f64::INFINITY, None);
         for (quadrant, toward) in QUADRANTS.into_iter().enumerate() {
@@ -449,8 +461,8 @@ impl Sweeper {
         best
     }
 
-    /// The value and the distance of a neighbour whose plain difference is the one-sided difference of second order;
-    /// of the neighbour itself where a kink or the border is near.
+    /// The value and the distance of a neighbour whose plain difference is the one-sided difference of second
+    /// order; of the neighbour itself where a kink or the border is near.
     fn one_sided(&self, k: usize, axis: usize, toward: f64) -> (f64, f64) {
         let (here, pitch) = (self.first[k], self.pitch[axis]);
         let close = pitch * self.fronts[k].steepest[axis];

@@ -73,13 +73,14 @@ impl<'a> LevelTracer<'a> {
         tracer
     }
 
-    /// The same, but what it traces is the streamline through the first point of each component, by Runge–Kutta steps that nothing pulls
-    /// onto the level.
+    /// The same, but what it traces is the streamline through the first point of each component, by
+    /// Runge–Kutta steps that nothing pulls onto the level.
     pub fn by_steps_alone(self) -> Self {
         Self { pulled: false, ..self }
     }
 
-    /// The place at a share of the way from a traced point to the next one: on the level, or by one shorter step.
+    /// The place at a share of the way from a traced point to the next one: on the level, or by one shorter
+    /// step.
     pub fn between(&self, [a, b]: [[f64; 2]; 2], share: f64, level: f64) -> [f64; 2] {
         let way = [b[0] - a[0], b[1] - a[1]];
         let line = [a[0] + share * way[0], a[1] + share * way[1]];
@@ -189,8 +190,8 @@ impl<'a> LevelTracer<'a> {
         Some([p[0] + h * mean(0), p[1] + h * mean(1)])
     }
 
-    /// Traces from the first point of a chain toward the second, until the domain's border or the beginning is reached again;
-    /// `None` where that takes `longest` mm or more.
+    /// Traces from the first point of a chain toward the second, until the domain's border or the beginning
+    /// is reached again; `None` where that takes `longest` mm or more.
     fn trace(&self, chain: &LevelCurve, level: f64, longest: f64) -> Option<LevelCurve> {
         let (next, closed) = (chain.points[1], chain.closed);
         let seed = self.seed(chain.points[0], level);
@@ -247,7 +248,8 @@ impl<'a> LevelTracer<'a> {
         self.along_border(r, 1 - axis, level, most)
     }
 
-    /// Moves a place along a border, in one parameter, onto the level, by Newton's method in steps of at most `most`.
+    /// Moves a place along a border, in one parameter, onto the level, by Newton's method in steps of at most
+    /// `most`.
     fn along_border(&self, mut r: [f64; 2], along: usize, level: f64, most: f64) -> [f64; 2] {
         for _ in 0..4 {
             let values = self.value_and_gradient(r);
@@ -426,7 +428,8 @@ mod tests {
         assert!(order > 3.7, "order {order}");
     }
 
-    /// Once around a level of 31 mm on a surface that bends, by steps alone, no place is off it by as much as a chord tolerance.
+    /// Once around a level of 31 mm on a surface that bends, by steps alone, no place is off it by as much as
+    /// a chord tolerance.
     #[test]
     fn levels_and_traced_lines_agree() {
         let field = spline(|x, y| x * x + y * y + 0.3 * x * y * y);

@@ -1,12 +1,13 @@
-//! Feed-direction fields, stream functions and their level curves, on a rectangular parameter
-//! domain with the metric of the surface, and on triangle meshes ([`mesh`]). Knows nothing of cutters.
+//! Feed-direction fields, stream functions and their level curves, on a rectangular parameter domain with the
+//! metric of the surface, and on triangle meshes ([`mesh`]). Knows nothing of cutters.
 //!
-//! Enters: directions sampled over the domain, or at scattered places, and the density of passes
-//! wanted there. Leaves: a stream function ψ whose level curves follow the directions (a B-spline or a
-//! grid of differences), and those curves traced by arc length.
+//! Enters: directions sampled over the domain, or at scattered places, and the density of passes wanted
+//! there. Leaves: a stream function ψ whose level curves follow the directions (a B-spline or a grid of
+//! differences), and those curves traced by arc length.
 //!
-//! Three methods fit a stream function: B-splines on a parameter rectangle ([`fit_stream_function`]), differences on a
-//! grid, and linear elements on a mesh. Elements serve parts of several patches, and meshes that no height surface follows.
+//! Three methods fit a stream function: B-splines on a parameter rectangle ([`fit_stream_function`]),
+//! differences on a grid, and linear elements on a mesh. Elements serve parts of several patches, and meshes
+//! that no height surface follows.
 
 mod difference;
 mod direction;

@@ -1,33 +1,36 @@
-//! Stream functions whose level curves, one apart, lie nowhere farther from each other than they may and are shortest
-//! in all: spacing and direction as one problem.
+//! Stream functions whose level curves, one apart, lie nowhere farther from each other than they may and are
+//! shortest in all: spacing and direction as one problem.
 //!
-//! Enters: at sites all over a surface the slowness `s` (1/mm) that a direction across the passes asks for (one over the
-//! greatest distance of passes), and what a mm of pass costs in that direction. Leaves: the coefficients of ψ that
-//! minimise
+//! Enters: at sites all over a surface the slowness `s` (1/mm) that a direction across the passes asks for
+//! (one over the greatest distance of passes), and what a mm of pass costs in that direction. Leaves: the
+//! coefficients of ψ that minimise
 //!
 //! ```text
 //! ∫ c(θ) |∇ψ| dA    with    |∇ψ| >= s(θ),    θ the direction of ∇ψ.
 //! ```
 //!
-//! plus, along borders, half a mm for each mm that passes run parallel to (a pass that meets a border aslant runs on until
-//! its strip is cut): `½ |cos φ|`, φ the angle between both.
+//! plus, along borders, half a mm for each mm that passes run parallel to (a pass that meets a border aslant
+//! runs on until its strip is cut): `½ |cos φ|`, φ the angle between both.
 //!
-//! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it by kinks and by
-//! the directions that its start leaves; here a little of the distance is given up where better directions are worth more.
+//! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it
+//! by kinks and by the directions that its start leaves; here a little of the distance is given up where
+//! better directions are worth more.
 //!
-//! The cost `c` is the way of the cutter's centre and not that of the contact, since the machine follows the cutter. On a
-//! surface of curvatures ±κ the two prefer opposite directions.
+//! The cost `c` is the way of the cutter's centre and not that of the contact, since the machine follows the
+//! cutter. On a surface of curvatures ±κ the two prefer opposite directions.
 //!
-//! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at borders may have a
-//! price ([`minimise_priced`]), and `c` may hold one of turning.
+//! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at
+//! borders may have a price ([`minimise_priced`]), and `c` may hold one of turning.
 //!
-//! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense as they must be,
-//! and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980), preconditioned by the equations of
-//! `∫ |∇ψ|²`, so that the number of steps hardly depends on the grid. ψ may be any function that is linear in its
-//! coefficients: [`Gradients`] says how its gradient follows from them.
+//! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense
+//! as they must be, and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980),
+//! preconditioned by the equations of `∫ |∇ψ|²`, so that the number of steps hardly depends on the grid. ψ
+//! may be any function that is linear in its coefficients: [`Gradients`] says how its gradient follows from
+//! them.
 //!
 //! # Limits
-//! A local minimum: [`minimise`] is called from several starts. Sites see what lies between them by their area only.
+//! A local minimum: [`minimise`] is called from several starts. Sites see what lies between them by their
+//! area only.
 
 use super::eikonal::Front;
 use super::sparse::{Entry, Factor};
@@ -51,8 +54,8 @@ const LEAST_GAIN: f64 = 1e-4;
 /// Halvings of a step before a round ends.
 const MOST_HALVINGS: usize = 30;
 
-/// No pass costs less than this share of the mean, what leaving a direction costs aside: where the cutter hardly moves, ψ would else be
-/// without direction.
+/// No pass costs less than this share of the mean, what leaving a direction costs aside: where the cutter
+/// hardly moves, ψ would else be without direction.
 const LEAST_COST: f64 = 0.02;
 
 /// A shortfall above this doubles the passes: they are put between others.
@@ -66,12 +69,13 @@ const SQUARE: f64 = 0.1;
 pub struct Site {
     /// Its surface area, mm².
     pub area: f64,
-    /// The area, mm², that it stands for in the preconditioner, on which no minimum depends: 0 where other sites tell as
-    /// much by fewer coefficients.
+    /// The area, mm², that it stands for in the preconditioner, on which no minimum depends: 0 where other
+    /// sites tell as much by fewer coefficients.
     pub stiff_area: f64,
     /// The slowness by direction across the passes.
     pub front: Front,
-    /// Cost of a mm of pass, `[m, c, s]` of `m + c cos 2θ + s sin 2θ`, θ the direction across it in the frame of `front`.
+    /// Cost of a mm of pass, `[m, c, s]` of `m + c cos 2θ + s sin 2θ`, θ the direction across it in the frame
+    /// of `front`.
     pub cost: [f64; 3],
     /// What of that is no length, but a price of turning.
     pub turning: [f64; 3],
@@ -96,15 +100,15 @@ impl Gradients {
         Self { starts: vec![0], terms: Vec::new(), coefficients }
     }
 
-    /// Adds a site: coefficients, each below the number given, with their shares of the derivatives by the two
-    /// parameters.
+    /// Adds a site: coefficients, each below the number given, with their shares of the derivatives by the
+    /// two parameters.
     pub fn push(&mut self, site: &Site, terms: impl Iterator<Item = (u32, [f64; 2])>) {
         self.terms.extend(terms.map(|(k, derivatives)| (k, site.front.covector(derivatives))));
         self.starts.push(self.terms.len() as u32);
     }
 
-    /// Those of functions whose coefficients are tied, by the unknowns; to them comes what is `given` at each site, by components in its
-    /// frame.
+    /// Those of functions whose coefficients are tied, by the unknowns; to them comes what is `given` at each
+    /// site, by components in its frame.
     pub fn tied(&self, tied: &Tied, given: &[[f64; 2]]) -> Self {
         let mut gradients = Self { coefficients: tied.count, ..Self::new(0) };
         for (site, &given) in given.iter().enumerate() {
@@ -157,7 +161,8 @@ impl Roughness {
     }
 }
 
-/// How coefficients follow from fewer unknowns. The first unknown is 1: it stands for what is given, and a minimum holds it.
+/// How coefficients follow from fewer unknowns. The first unknown is 1: it stands for what is given, and a
+/// minimum holds it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tied {
     /// What is given of each coefficient.
@@ -270,13 +275,15 @@ pub fn minimise_priced(
 }
 
 impl Site {
-    /// The cost from what a mm of pass costs when the direction across it is 0, 60 and 120 degrees in the frame.
+    /// The cost from what a mm of pass costs when the direction across it is 0, 60 and 120 degrees in the
+    /// frame.
     pub fn harmonic([a, b, c]: [f64; 3]) -> [f64; 3] {
         let mean = (a + b + c) / 3.0;
         [mean, a - mean, (b - c) / 3f64.sqrt()]
     }
 
-    /// The mean over all directions of a price that is `dearer` square to one and falls to 0 along it as a sine's square.
+    /// The mean over all directions of a price that is `dearer` square to one and falls to 0 along it as a
+    /// sine's square.
     pub fn mean_of_leaving(dearer: f64) -> f64 {
         0.5 * dearer
     }
@@ -301,8 +308,8 @@ impl Site {
         (self.area * cost * norm2.sqrt(), (square.max(0.0) / norm2).sqrt() - 1.0)
     }
 
-    /// What the ends of passes cost at a border, and the derivative of that by the angle; `unit` is the direction across
-    /// the passes.
+    /// What the ends of passes cost at a border, and the derivative of that by the angle; `unit` is the
+    /// direction across the passes.
     fn ends(&self, unit: [f64; 2]) -> (f64, f64) {
         let Some([along, across]) = self.border else { return (0.0, 0.0) };
         let length = along.hypot(across);
@@ -313,8 +320,8 @@ impl Site {
         (0.5 * (smooth - SQUARE * length), if smooth > 0.0 { 0.5 * parallel * turn / smooth } else { 0.0 })
     }
 
-    /// How many passes end at a border for each 1/mm of a gradient in the direction of `unit`, and the derivative of that
-    /// by the angle.
+    /// How many passes end at a border for each 1/mm of a gradient in the direction of `unit`, and the
+    /// derivative of that by the angle.
     fn count(&self, unit: [f64; 2]) -> (f64, f64) {
         let Some([along, across]) = self.border else { return (0.0, 0.0) };
         let length = along.hypot(across);
@@ -324,8 +331,8 @@ impl Site {
         (smooth - SQUARE * length, if smooth > 0.0 { -met * parallel / smooth } else { 0.0 })
     }
 
-    /// What a gradient costs with the penalty and a price of each end at a border, and the derivatives of that by its
-    /// components.
+    /// What a gradient costs with the penalty and a price of each end at a border, and the derivatives of
+    /// that by its components.
     fn charge(&self, q: [f64; 2], penalty: f64, end: f64) -> (f64, [f64; 2]) {
         let norm2 = (q[0] * q[0] + q[1] * q[1]).max(f64::MIN_POSITIVE);
         let norm = norm2.sqrt();
@@ -388,8 +395,8 @@ impl Problem<'_> {
         sum
     }
 
-    /// The factor of the equations of `∫ (c/s) |∇ψ|²` and the roughness, the first coefficient held: about the second
-    /// derivatives of the cost.
+    /// The factor of the equations of `∫ (c/s) |∇ψ|²` and the roughness, the first coefficient held: about
+    /// the second derivatives of the cost.
     fn stiffness(&self) -> Option<Factor<f64>> {
         let n = self.gradients.coefficients;
         let mut entries: Vec<Entry<f64>> = Vec::new();
@@ -514,7 +521,8 @@ mod tests {
     /// Cells a side of the unit square.
     const CELLS: usize = 12;
 
-    /// Bilinear functions on the unit square, the speed at a place by the direction across, the cost likewise.
+    /// Bilinear functions on the unit square, the speed at a place by the direction across, the cost
+    /// likewise.
     fn square(
         speed: impl Fn(f64, f64, [f64; 2]) -> f64,
         cost: [f64; 3],
@@ -610,8 +618,8 @@ mod tests {
         assert!(widest(&problem, &found) < 0.01);
     }
 
-    /// Aslant a pass is a little cheaper, but there are more of them: ends that cost much leave no more than there are along a
-    /// side, or fewer, since passes bend to close.
+    /// Aslant a pass is a little cheaper, but there are more of them: ends that cost much leave no more than
+    /// there are along a side, or fewer, since passes bend to close.
     #[test]
     fn a_price_for_each_end_leaves_fewer_passes() {
         let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, -0.1], true);
@@ -625,7 +633,8 @@ mod tests {
         assert!(free > 26.0 && free < 28.5 && dear < 22.0, "{free} {dear}");
     }
 
-    /// Of coefficients that are tied, with something given besides, gradients and roughness are those of the coefficients themselves.
+    /// Of coefficients that are tied, with something given besides, gradients and roughness are those of the
+    /// coefficients themselves.
     #[test]
     fn tied_coefficients_have_the_gradients_of_their_function() {
         let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], true);
@@ -662,13 +671,14 @@ mod tests {
         assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
     }
 
-    /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they end at two
-    /// of four sides, and the other two see them parallel.
+    /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they
+    /// end at two of four sides, and the other two see them parallel.
     #[test]
     fn ends_at_borders_count() {
         let problem = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], true);
         let aslant: f64 = problem.0.iter().map(|site| site.ends([0.5f64.sqrt(); 2]).0).sum();
-        // Four sides of 1 mm at 45 degrees, half of the cosine each; less what is not told from a square meeting.
+        // Four sides of 1 mm at 45 degrees, half of the cosine each; less what is not told from a square
+        // meeting.
         assert!((aslant - 2.0 * (0.5f64.sqrt() - SQUARE)).abs() < 0.03, "{aslant}");
         let along: f64 = problem.0.iter().map(|site| site.ends([1.0, 0.0]).0).sum();
         assert!((along - 1.0).abs() < 0.11, "{along}");
@@ -688,7 +698,8 @@ mod tests {
     }
 
     proptest! {
-        /// The derivatives are those of the charge, also where the front is a table and costs depend on direction.
+        /// The derivatives are those of the charge, also where the front is a table and costs depend on
+        /// direction.
         #[test]
         fn derivatives_are_those_of_the_charge(
             angle in 0.0..6.3f64, norm in 0.3..3.0f64, swing in -0.6..0.6f64, sine in -0.4..0.4f64,

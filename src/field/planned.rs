@@ -33,7 +33,8 @@ pub struct LevelLine {
 /// Angles between passes and the feed directions asked for, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionError {
-    /// Root mean square over the length of all passes, or over the rows of a table, or over the length of guides and borders.
+    /// Root mean square over the length of all passes, or over the rows of a table, or over the length of
+    /// guides and borders.
     pub rms: f64,
     /// The greatest.
     pub max: f64,
@@ -89,6 +90,7 @@ pub struct ShortestPossible {
     pub cutting_mm: f64,
     /// Of the contact on the surface: the integral of `1/w_max`, mm.
     pub contact_mm: f64,
-    /// Share of the surface where the part is as concave as the cutter, or nearly so: the strip is limited there.
+    /// Share of the surface where the part is as concave as the cutter, or nearly so: the strip is limited
+    /// there.
     pub limited_fraction: f64,
 }

@@ -11,7 +11,8 @@
 //!
 //! Limits: linear fields of `2θ` are reproduced; the error is of second order in the distance of samples.
 
-/// Samples whose coordinates differ by no more than this, mm or of a parameter, stand on a line: less is lost in a division.
+/// Samples whose coordinates differ by no more than this, mm or of a parameter, stand on a line: less is lost
+/// in a division.
 const NARROWEST: f64 = 1e-12;
 
 /// A direction at a place.
@@ -302,7 +303,8 @@ fn plane_value(m: &[f64; 6], sides: &[[f64; 3]; 2]) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// `n` × `n` places of [0, 4] × [0, 2], shaken by up to `shake` of their distance, every third line turned round.
+    /// `n` × `n` places of [0, 4] × [0, 2], shaken by up to `shake` of their distance, every third line
+    /// turned round.
     fn samples(n: usize, shake: f64, angle: impl Fn(f64, f64) -> f64) -> Vec<LineSample> {
         (0..n * n)
             .map(|k| {

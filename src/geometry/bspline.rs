@@ -219,8 +219,8 @@ impl KnotVector {
         self.derivatives(u, self.degree, order)
     }
 
-    /// As [`KnotVector::basis_derivatives`] of second order, where the number `N` of basis functions, one more than the degree, is
-    /// known to the compiler: the same bits in a fraction of the time.
+    /// As [`KnotVector::basis_derivatives`] of second order, where the number `N` of basis functions, one
+    /// more than the degree, is known to the compiler: the same bits in a fraction of the time.
     ///
     /// # Panics
     /// Where `N` is another number.
@@ -252,8 +252,8 @@ impl KnotVector {
         (span - p, out)
     }
 
-    /// As [`KnotVector::basis_derivatives`] of first order, where the number `N` of basis functions, one more than the
-    /// degree, is known to the compiler: the same bits in a fraction of the time.
+    /// As [`KnotVector::basis_derivatives`] of first order, where the number `N` of basis functions, one more
+    /// than the degree, is known to the compiler: the same bits in a fraction of the time.
     ///
     /// # Panics
     /// Where `N` is another number.

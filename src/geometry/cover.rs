@@ -1,13 +1,14 @@
-//! Whether shapes cover a stadium (all that is near to a straight line) whole, told by samples of its rim with a margin that
-//! makes it sure.
+//! Whether shapes cover a stadium (all that is near to a straight line) whole, told by samples of its rim
+//! with a margin that makes it sure.
 //!
-//! Of convex shapes that hold the middle of the stadium the rim is enough: with a place of the rim such a shape holds all of the
-//! straight line from the middle to there.
+//! Of convex shapes that hold the middle of the stadium the rim is enough: with a place of the rim such a
+//! shape holds all of the straight line from the middle to there.
 
 use crate::Vector2;
 use std::f64::consts::TAU;
 
-/// Places of a unit circle, those first that are far from each other: they mostly tell that a stadium is not covered.
+/// Places of a unit circle, those first that are far from each other: they mostly tell that a stadium is not
+/// covered.
 #[derive(Debug, Clone)]
 pub struct RimSamples {
     directions: Vec<Vector2>,
@@ -31,9 +32,9 @@ impl RimSamples {
         Self { directions: order.map(at).collect() }
     }
 
-    /// Whether convex `shapes`, which all hold the middle between both ends, cover the stadium of this radius around `ends`.
-    /// `covers` tells whether a shape holds all that is within [`RimSamples::MARGIN`] (times the radius) of a place. The order
-    /// of the shapes changes.
+    /// Whether convex `shapes`, which all hold the middle between both ends, cover the stadium of this radius
+    /// around `ends`. `covers` tells whether a shape holds all that is within [`RimSamples::MARGIN`] (times
+    /// the radius) of a place. The order of the shapes changes.
     pub fn covered<T>(
         &self,
         [a, b]: [Vector2; 2],

@@ -1,10 +1,11 @@
 //! Points, curves, surfaces, triangle meshes and their search trees, plane regions. Knows nothing of cutters.
 //!
-//! Enters: control points, knots, formulas, triangles or outlines. Leaves: checked shapes that give places, derivatives,
-//! nearest points and tessellations. Lengths in mm, angles in rad, f64 throughout; boxes of search trees are f32, rounded
-//! outward.
+//! Enters: control points, knots, formulas, triangles or outlines. Leaves: checked shapes that give places,
+//! derivatives, nearest points and tessellations. Lengths in mm, angles in rad, f64 throughout; boxes of
+//! search trees are f32, rounded outward.
 //!
-//! Limits: coordinates up to [`MAX_COORDINATE`]. Shapes out of range are refused by the error type of each shape.
+//! Limits: coordinates up to [`MAX_COORDINATE`]. Shapes out of range are refused by the error type of each
+//! shape.
 
 mod aabb;
 mod analytic;

@@ -1,8 +1,9 @@
 //! The place that is nearest to some planes.
 //!
-//! Enters: planes, of which there is at least one. Leaves: the place at which they meet, least squares, by the eigenvalues of
-//! their normals' outer products (T. Ju, F. Losasso, S. Schaefer and J. Warren, "Dual contouring of Hermite data", 2002).
-//! Directions in which the planes say next to nothing are left at the mean of their points.
+//! Enters: planes, of which there is at least one. Leaves: the place at which they meet, least squares, by
+//! the eigenvalues of their normals' outer products (T. Ju, F. Losasso, S. Schaefer and J. Warren, "Dual
+//! contouring of Hermite data", 2002). Directions in which the planes say next to nothing are left at the
+//! mean of their points.
 
 use super::{Point3, Vector3};
 use nalgebra::Matrix3;
@@ -21,16 +22,16 @@ pub struct Plane {
 pub struct Meeting {
     /// The place.
     pub place: Point3,
-    /// In how many directions the planes hold it: 1 on a plane, 2 on a line, 3 in a corner; 0 where no place may be taken, which
-    /// then is the nearest one along the normal that the planes have most of.
+    /// In how many directions the planes hold it: 1 on a plane, 2 on a line, 3 in a corner; 0 where no place
+    /// may be taken, which then is the nearest one along the normal that the planes have most of.
     pub rank: usize,
     /// Mean of the planes' points.
     pub mean: Point3,
 }
 
-/// The place nearest to all planes among those that `may_hold` takes: with fewer directions held where more lead elsewhere.
-/// Eigenvalues below the share `flat` of the greatest do not count: normals that spread by less than its square root, rad, are
-/// one.
+/// The place nearest to all planes among those that `may_hold` takes: with fewer directions held where more
+/// lead elsewhere. Eigenvalues below the share `flat` of the greatest do not count: normals that spread by
+/// less than its square root, rad, are one.
 pub fn meeting(planes: &[Plane], flat: f64, may_hold: impl Fn(&Point3) -> bool) -> Meeting {
     let count = planes.len() as f64;
     let mean = Point3::from(planes.iter().map(|p| p.point.coords).sum::<Vector3>() / count);

@@ -13,9 +13,9 @@ mod tests;
 use super::{Aabb, Point3, Vector3, distance_to_segment};
 
 /// A checked triangle mesh: every index in range, every coordinate finite and within
-/// [`super::MAX_COORDINATE`], no degenerate and no duplicate triangle, at most two triangles at an
-/// edge, orientation consistent across edges. Open borders are allowed. [`TriangleMesh::opened`] makes one of triangles that are no
-/// surface: more of them may meet at edges, where each of them ends.
+/// [`super::MAX_COORDINATE`], no degenerate and no duplicate triangle, at most two triangles at an edge,
+/// orientation consistent across edges. Open borders are allowed. [`TriangleMesh::opened`] makes one of
+/// triangles that are no surface: more of them may meet at edges, where each of them ends.
 #[derive(Debug, Clone)]
 pub struct TriangleMesh {
     vertices: Vec<Point3>,
@@ -205,9 +205,9 @@ impl TriangleMesh {
         Self::with_sources(vertices, triangles, Outside::Found).map(|(mesh, notes, _)| (mesh, notes))
     }
 
-    /// As [`TriangleMesh::new`] with the outside found or given, and tells where each corner comes from: for every triangle of the
-    /// mesh, the indices into the given `vertices` of its corners, in the mesh's order. Whoever
-    /// keeps parameters per vertex finds them this way after merging, dropping and turning.
+    /// As [`TriangleMesh::new`] with the outside found or given, and tells where each corner comes from: for
+    /// every triangle of the mesh, the indices into the given `vertices` of its corners, in the mesh's order.
+    /// Whoever keeps parameters per vertex finds them this way after merging, dropping and turning.
     ///
     /// # Errors
     /// See [`MeshError`].
@@ -219,9 +219,10 @@ impl TriangleMesh {
         repair::repair(vertices, triangles, outside, Junctions::Refused)
     }
 
-    /// As [`TriangleMesh::new`] for meshes that need not be a surface: an edge where more than two triangles meet, or two
-    /// that cannot face the same side, is left open, as a border of each of them. Open pieces then each face upward. Heights
-    /// and distances are those of all triangles; what is inside may be unknown.
+    /// As [`TriangleMesh::new`] for meshes that need not be a surface: an edge where more than two triangles
+    /// meet, or two that cannot face the same side, is left open, as a border of each of them. Open pieces
+    /// then each face upward. Heights and distances are those of all triangles; what is inside may be
+    /// unknown.
     ///
     /// # Errors
     /// See [`MeshError`]; neither [`MeshError::NonManifoldEdge`] nor [`MeshError::NotOrientable`].
@@ -273,7 +274,8 @@ impl TriangleMesh {
         (n != NONE).then_some(n as usize)
     }
 
-    /// The triangles that a point on triangle `t` belongs to, that one first: two at an edge, a fan at a vertex.
+    /// The triangles that a point on triangle `t` belongs to, that one first: two at an edge, a fan at a
+    /// vertex.
     pub fn triangles_at(&self, t: usize, point: &Point3) -> Vec<usize> {
         let mut found = vec![t];
         let mut looked = 0;

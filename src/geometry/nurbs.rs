@@ -186,7 +186,8 @@ impl NurbsSurface {
         }
     }
 
-    /// By the basis functions along both parameters with their derivatives; each first entry is the first control point that matters.
+    /// By the basis functions along both parameters with their derivatives; each first entry is the first
+    /// control point that matters.
     #[inline(always)]
     fn combined<const N: usize>(
         &self,

@@ -49,7 +49,8 @@ impl HalfSpace {
         self.offset - half * self.gradient.map(f64::abs).sum()
     }
 
-    /// Whether its value is nowhere above that of another one in the cube of half side `half` around the origin.
+    /// Whether its value is nowhere above that of another one in the cube of half side `half` around the
+    /// origin.
     pub fn is_below(&self, other: &Self, half: f64) -> bool {
         let (gradient, offset) = (other.gradient - self.gradient, other.offset - self.offset);
         Self { gradient, offset }.least(half) >= 0.0
@@ -103,7 +104,8 @@ impl Polytope {
                     if at == 0.0 {
                         self.cap.push(*a);
                     }
-                    // From inside to outside in both faces that share the edge, so that both get the same point.
+                    // From inside to outside in both faces that share the edge, so that both get the same
+                    // point.
                     let crossing = match (at > 0.0, then > 0.0) {
                         (true, false) if then < 0.0 => a + (b - a) * (at / (at - then)),
                         (false, true) if at < 0.0 => b + (a - b) * (then / (then - at)),
@@ -144,8 +146,9 @@ impl Polytope {
     }
 }
 
-/// Leaves the corners of a convex face in order around it (Andrew's monotone chain); false where they are too few for a face. Corners
-/// that only rounding tells from their neighbours, or from the line between those, are none: they would be more with every cut.
+/// Leaves the corners of a convex face in order around it (Andrew's monotone chain); false where they are too
+/// few for a face. Corners that only rounding tells from their neighbours, or from the line between those,
+/// are none: they would be more with every cut.
 fn put_around(cap: &mut Vec<Vector3>, flat: &mut Vec<([f64; 2], Vector3)>, normal: &Vector3) -> bool {
     let across = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
     let along = normal.normalize().cross(&across);
@@ -235,8 +238,8 @@ mod tests {
         }
     }
 
-    /// Many planes that lie in one another but for rounding, as of moves of equal height: a face has no more corners than cuts, and the
-    /// volume is that of one cut.
+    /// Many planes that lie in one another but for rounding, as of moves of equal height: a face has no more
+    /// corners than cuts, and the volume is that of one cut.
     #[test]
     fn cuts_that_only_rounding_tells_apart_do_not_multiply_corners() {
         let mut state = 99u64;

@@ -293,8 +293,8 @@ impl Region {
         work::aside::run(monitor, move || region.offset(distance))
     }
 
-    /// How much farther than by `distance` straight sides move in an offset, mm: so far that the chords of round corners
-    /// come no nearer.
+    /// How much farther than by `distance` straight sides move in an offset, mm: so far that the chords of
+    /// round corners come no nearer.
     pub fn offset_excess(distance: f64) -> f64 {
         distance / (0.5 * ROUND_STEP).cos() - distance
     }
@@ -317,8 +317,9 @@ impl Region {
         Self::of_shapes(self.shapes().outline_as::<i64>(&style), distance)
     }
 
-    /// A piece whose outline grows and whose islands shrink, each by itself: what lies inside of one island is nearer to no other
-    /// curve. Chords of round corners shrink until they cross each other many times, which takes long by crossings.
+    /// A piece whose outline grows and whose islands shrink, each by itself: what lies inside of one island
+    /// is nearer to no other curve. Chords of round corners shrink until they cross each other many times,
+    /// which takes long by crossings.
     fn piece_grown(piece: &Piece, distance: f64) -> Self {
         let alone = |outer| Self { pieces: vec![Piece { outer, islands: Vec::new() }] };
         let mut grown = alone(piece.outer.clone()).offset(distance);
@@ -430,8 +431,8 @@ impl Region {
     }
 }
 
-/// What lies at least `distance` inside of a convex counter-clockwise curve, as far as [`Region::inset`] takes it: what all of its
-/// sides have on their left. `None` where the curve is not convex.
+/// What lies at least `distance` inside of a convex counter-clockwise curve, as far as [`Region::inset`]
+/// takes it: what all of its sides have on their left. `None` where the curve is not convex.
 fn shrunk_convex(curve: &[Point2], distance: f64) -> Option<Vec<[f64; 2]>> {
     let n = curve.len();
     let side = |k: usize| curve[(k + 1) % n] - curve[k];
@@ -448,7 +449,8 @@ fn shrunk_convex(curve: &[Point2], distance: f64) -> Option<Vec<[f64; 2]>> {
     Some(left.into_iter().map(|p| [p.x, p.y]).collect())
 }
 
-/// What of a polygon lies where `inside`, linear in the place, is 0 or more (I. Sutherland and G. Hodgman 1974).
+/// What of a polygon lies where `inside`, linear in the place, is 0 or more (I. Sutherland and G. Hodgman
+/// 1974).
 pub fn clipped<const D: usize>(
     polygon: &[nalgebra::Point<f64, D>],
     inside: impl Fn(&nalgebra::Point<f64, D>) -> f64,
@@ -557,7 +559,8 @@ mod tests {
         assert!((rest - corners).abs() < 2.0 * bound, "{rest} {corners}");
     }
 
-    /// Islands shrink as they do all at once: those with a neck fall apart, small ones vanish, and bays of the outline close.
+    /// Islands shrink as they do all at once: those with a neck fall apart, small ones vanish, and bays of
+    /// the outline close.
     #[test]
     fn islands_shrink_each_by_itself() {
         let dumbbell =

@@ -93,7 +93,8 @@ mod tests {
         Region::nested(curves).unwrap().0
     }
 
-    /// A square with a square island, against the distance from both borders and against many places in squares.
+    /// A square with a square island, against the distance from both borders and against many places in
+    /// squares.
     #[test]
     fn depths_and_squares_are_those_of_the_region() {
         let index =

@@ -95,9 +95,9 @@ pub fn ridge() -> NurbsSurface {
     NurbsSurface::new(3, 3, knots.knots().to_vec(), knots.knots().to_vec(), &points, None).unwrap()
 }
 
-/// The patches of scenes/joined.json: three side by side with tangent planes in common along their borders, cut into spans and
-/// parametrised differently. About 54 × 36 mm; control points to 0.001 mm,
-/// but for those that follow from a neighbour's.
+/// The patches of scenes/joined.json: three side by side with tangent planes in common along their borders,
+/// cut into spans and parametrised differently. About 54 × 36 mm; control points to 0.001 mm, but for those
+/// that follow from a neighbour's.
 pub fn joined() -> Vec<NurbsSurface> {
     let round = |c: f64| (c * 1000.0).round() / 1000.0 + 0.0;
     let height = |x: f64, y: f64| 2.6 * (0.16 * x + 0.5).sin() * (0.13 * y).cos() + 0.04 * x;

@@ -1,7 +1,8 @@
 //! The sheets of the surface in a cell: which of the cell's edges that the surface crosses one sheet crosses.
 //!
-//! On a face whose opposite corners are inside the sheets run around the corners inside, seen from both cells of the face. So
-//! every crossed edge of a face leads to one other, the edges of a cell form rings, and each ring is one sheet.
+//! On a face whose opposite corners are inside the sheets run around the corners inside, seen from both cells
+//! of the face. So every crossed edge of a face leads to one other, the edges of a cell form rings, and each
+//! ring is one sheet.
 
 /// The edges of a cell: two corners each. Corner `k` lies higher along axis `i` where bit `i` of `k` is set.
 pub const EDGES: [[usize; 2]; 12] =
@@ -102,7 +103,8 @@ mod tests {
     fn sheets_are_rings_around_what_is_inside() {
         let sheets = Sheets::table();
         assert_eq!([0, 255].map(|shape| sheets.count(shape)), [0, 0]);
-        // Two corners apart, and two holes apart, are two sheets; opposite corners of a face as well, but holes there one.
+        // Two corners apart, and two holes apart, are two sheets; opposite corners of a face as well, but
+        // holes there one.
         assert_eq!([0b1000_0001, 0b0111_1110, 0b1001, 0b1111_0110].map(|s| sheets.count(s)), [2, 2, 2, 1]);
         assert_eq!(sheets.count(0b0110_1001), 4);
         for (edge, ends) in EDGES.iter().enumerate() {

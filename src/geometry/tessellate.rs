@@ -168,8 +168,8 @@ impl Family {
         [at(k), at(k + 1)]
     }
 
-    /// A parameter inside strip `s`, at a place that changes from strip to strip (golden section): equal places
-    /// can all fall on the inflections of a wave.
+    /// A parameter inside strip `s`, at a place that changes from strip to strip (golden section): equal
+    /// places can all fall on the inflections of a wave.
     fn sample(&self, s: usize) -> f64 {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let [a, b] = self.strip(s);
@@ -271,8 +271,8 @@ impl Density {
         Self { u, v }
     }
 
-    /// Lines for a tolerance, `refine` times denser than the formula says, at least so many between two kept ones, and no
-    /// cells much longer than wide.
+    /// Lines for a tolerance, `refine` times denser than the formula says, at least so many between two kept
+    /// ones, and no cells much longer than wide.
     fn lines(&self, tolerance: f64, refine: f64, least: usize) -> [Placement<'_>; 2] {
         let [u, v] = [&self.u, &self.v].map(|family| family.placement(tolerance, refine, least));
         let (long_u, long_v) = (self.u.length / u.len as f64, self.v.length / v.len as f64);

@@ -5,14 +5,16 @@ use cutter::Cutter;
 use motion::{ClPoint, Cutters, MoveKind, Toolpath};
 use std::io::{self, Write};
 
-/// Decimals of the tool axis. With seven the axis is off by 8.7e-8 at most (√3/2 of the last one), which moves
-/// the end of a cutter of 100 mm by 0.009 µm, less than the tip is rounded by; with six it would be 0.09 µm.
+/// Decimals of the tool axis. With seven the axis is off by 8.7e-8 at most (√3/2 of the last one), which
+/// moves the end of a cutter of 100 mm by 0.009 µm, less than the tip is rounded by; with six it would be
+/// 0.09 µm.
 const AXIS_DECIMALS: usize = 7;
 
-/// Writes `PARTNO`, the cutter (another one, with `LOADTL`, where its moves begin), `FROM` the start of the path and one `GOTO` a move, each rapid after its
-/// own `RAPID` (which holds for one motion only), and `FEDRAT` wherever the feed changes. Numbers have
-/// four decimals, so each coordinate stands within 0.05 µm of the path. Where the tool axis is not z
-/// throughout, `MULTAX/ON` is written and every location is `x,y,z,i,j,k`.
+/// Writes `PARTNO`, the cutter (another one, with `LOADTL`, where its moves begin), `FROM` the start of the
+/// path and one `GOTO` a move, each rapid after its own `RAPID` (which holds for one motion only), and
+/// `FEDRAT` wherever the feed changes. Numbers have four decimals, so each coordinate stands within 0.05 µm
+/// of the path. Where the tool axis is not z throughout, `MULTAX/ON` is written and every location is
+/// `x,y,z,i,j,k`.
 ///
 /// # Errors
 /// Whatever the writer returns.

@@ -7,11 +7,11 @@
 //! 10   0.0  0.98  0.17  1
 //! ```
 //!
-//! A line holds a place and a direction, and may add a weight (1 otherwise): `x y tx ty [weight]` in
-//! the plan view (mm), or `u v tu tv [weight]` in the parameters of the part's patches. A first line of
-//! words says which; without it they are x and y. Numbers stand apart by blanks, tabs, commas or
-//! semicolons; `#` begins a comment; empty lines are passed over. Directions are lines: `1 0` and
-//! `-1 0` are the same, and their length matters to a fit of velocities only, but 0 is refused. Places may be scattered.
+//! A line holds a place and a direction, and may add a weight (1 otherwise): `x y tx ty [weight]` in the plan
+//! view (mm), or `u v tu tv [weight]` in the parameters of the part's patches. A first line of words says
+//! which; without it they are x and y. Numbers stand apart by blanks, tabs, commas or semicolons; `#` begins
+//! a comment; empty lines are passed over. Directions are lines: `1 0` and `-1 0` are the same, and their
+//! length matters to a fit of velocities only, but 0 is refused. Places may be scattered.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};

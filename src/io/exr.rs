@@ -1,11 +1,12 @@
 //! OpenEXR files of maps over a grid, full precision.
 //!
-//! Channels: `Z` height, mm, and `deviation`, mm (NaN off the part), 32-bit float; `move` the index
-//! of the move that cut a cell last, 32-bit whole number, 4294967295 where none did. Row 0 of the
-//! picture holds the greatest y, as pictures are looked at. One text attribute, `millstream`, holds
-//! JSON: `cell_mm`, `origin_mm` (centre of the cell at the lower left), `unit`.
+//! Channels: `Z` height, mm, and `deviation`, mm (NaN off the part), 32-bit float; `move` the index of the
+//! move that cut a cell last, 32-bit whole number, 4294967295 where none did. Row 0 of the picture holds the
+//! greatest y, as pictures are looked at. One text attribute, `millstream`, holds JSON: `cell_mm`,
+//! `origin_mm` (centre of the cell at the lower left), `unit`.
 //!
-//! Lines are compressed on the calling thread, because the crate's own threads ignore the thread number that the user asks for.
+//! Lines are compressed on the calling thread, because the crate's own threads ignore the thread number that
+//! the user asks for.
 
 use std::io::{self, Cursor};
 
@@ -47,9 +48,9 @@ pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
     bytes_of(&image)
 }
 
-/// The bytes of an EXR file over the parameters of a patch: channels `X`, `Y`, `Z`, the design point, mm, `deviation`, mm
-/// (NaN where nothing was cut near), and `move`. Row 0 holds the greatest v, columns run with u; the text attribute
-/// `millstream` holds the parameters' ranges.
+/// The bytes of an EXR file over the parameters of a patch: channels `X`, `Y`, `Z`, the design point, mm,
+/// `deviation`, mm (NaN where nothing was cut near), and `move`. Row 0 holds the greatest v, columns run with
+/// u; the text attribute `millstream` holds the parameters' ranges.
 ///
 /// # Errors
 /// What the encoder says.

@@ -27,14 +27,16 @@ use std::io::{self, Write};
 pub type MoveLines = Vec<u32>;
 
 /// Writes the program of a path whose tool axis is z throughout ([`Toolpath::is_upright`]; any other needs
-/// [`write_five_axis`], and where no machine is given, cutter locations only) and tells the line of each move. A move that rounds to where the tip already is
-/// has no line of its own: it gets the line that brought the tip there.
+/// [`write_five_axis`], and where no machine is given, cutter locations only) and tells the line of each
+/// move. A move that rounds to where the tip already is has no line of its own: it gets the line that brought
+/// the tip there.
 ///
-/// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before
-/// the first move the tip rises to the highest tip of the path, or to what the header asks for, moves over its start and comes
-/// down there; after the last one it rises again.
+/// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before the
+/// first move the tip rises to the highest tip of the path, or to what the header asks for, moves over its
+/// start and comes down there; after the last one it rises again.
 ///
-/// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of them all.
+/// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of
+/// them all.
 ///
 /// # Errors
 /// Whatever the writer returns; a path with a tilted tool.

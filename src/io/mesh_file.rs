@@ -194,7 +194,8 @@ impl MeshFormat {
         self.read_within(path, &MeshLimits::default())
     }
 
-    /// As [`MeshFormat::read`] within limits, which are checked before any memory is taken for what is beyond them.
+    /// As [`MeshFormat::read`] within limits, which are checked before any memory is taken for what is beyond
+    /// them.
     ///
     /// # Errors
     /// [`MeshReadError`] when it cannot be read, holds no mesh, or is beyond the limits.

@@ -1,12 +1,12 @@
 //! OBJ files (Wavefront, 1992) to meshes: `v` and `f` lines. Units are taken to be mm.
 //!
-//! All objects and groups are read as one mesh. Normals, texture coordinates, colours, materials,
-//! lines, points and all other statements are passed over: they do not change the shape. Faces with
-//! more than three corners are cut into triangles; a free-form surface (`curv`, `surf`) is refused,
-//! since the part would lack it in silence.
+//! All objects and groups are read as one mesh. Normals, texture coordinates, colours, materials, lines,
+//! points and all other statements are passed over: they do not change the shape. Faces with more than three
+//! corners are cut into triangles; a free-form surface (`curv`, `surf`) is refused, since the part would lack
+//! it in silence.
 //!
-//! The reader is our own: the common crate turns polylines into faces, can panic on missing texture coordinates, fans concave
-//! polygons, and reports a bad index without its line.
+//! The reader is our own: the common crate turns polylines into faces, can panic on missing texture
+//! coordinates, fans concave polygons, and reports a bad index without its line.
 
 mod polygon;
 #[cfg(test)]

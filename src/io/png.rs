@@ -1,7 +1,7 @@
 //! PNG files of pictures: a palette where 256 colours suffice, else 8-bit RGB.
 //!
-//! Colour keys have so few shades that a picture with its letters keeps within a palette. Such a file is much smaller than
-//! RGB.
+//! Colour keys have so few shades that a picture with its letters keeps within a palette. Such a file is much
+//! smaller than RGB.
 
 use std::collections::BTreeSet;
 

@@ -14,8 +14,8 @@ pub struct ProgramHeader {
     pub name: String,
     /// Spindle speed, 1/min, clockwise; `None` leaves the spindle alone.
     pub spindle_speed: Option<f64>,
-    /// Programs of three axes begin and end no lower than this, mm: over what stands beside the path. `None` asks for nothing more
-    /// than the highest tip.
+    /// Programs of three axes begin and end no lower than this, mm: over what stands beside the path. `None`
+    /// asks for nothing more than the highest tip.
     pub rise_to: Option<f64>,
 }
 

@@ -1,4 +1,5 @@
-//! What this stage writes, the reader of programs reads back: every move of a path at the line that the writer names.
+//! What this stage writes, the reader of programs reads back: every move of a path at the line that the
+//! writer names.
 
 use std::collections::HashMap;
 
@@ -55,7 +56,8 @@ fn three_axes_by_every_control_that_has_no_own_words_for_them() {
     }
 }
 
-/// Down a helix, along a line onto a circle and off it, and around a corner, at three feeds; and the places of it.
+/// Down a helix, along a line onto a circle and off it, and around a corner, at three feeds; and the places
+/// of it.
 fn round_path() -> Toolpath {
     let mut path = example();
     path.moves.clear();
@@ -79,7 +81,8 @@ fn round_path() -> Toolpath {
     path.as_written()
 }
 
-/// Arcs stay within their tolerance of the moves, begin and end where these do, and have their feeds: lengths and times hold.
+/// Arcs stay within their tolerance of the moves, begin and end where these do, and have their feeds: lengths
+/// and times hold.
 #[test]
 fn arcs_stay_as_near_to_the_moves_as_they_are_asked_to() {
     let path = round_path();
@@ -190,7 +193,8 @@ fn five_axes_on_every_machine_in_both_styles() {
             let found = by_line(&read);
             for (step, line) in path.moves.iter().zip(&lines) {
                 let again = found[line].to;
-                // Half of the last decimal on three axes; angles turn the lengths of the machine, 600 mm, besides.
+                // Half of the last decimal on three axes; angles turn the lengths of the machine, 600 mm,
+                // besides.
                 assert!((again.tip - step.to.tip).norm() < 2.2e-4, "{name} {style:?} line {line}: {again:?}");
                 assert!((again.axis - step.to.axis).norm() < 3e-7, "{name} {style:?} line {line}");
             }

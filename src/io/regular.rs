@@ -1,7 +1,7 @@
 //! The one place where files are opened to be read. Enters: a path. Leaves: a regular file, or its bytes.
 //!
-//! A pipe, a socket or a device would let the program wait for ever, or read without end. Such a thing is refused
-//! before it is opened, since opening a pipe waits already.
+//! A pipe, a socket or a device would let the program wait for ever, or read without end. Such a thing is
+//! refused before it is opened, since opening a pipe waits already.
 
 use std::fs::{File, FileType, Metadata};
 use std::io::{self, Read as _};

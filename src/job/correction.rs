@@ -1,18 +1,20 @@
-//! The loop: plan, cut, measure the ridges, and plan again with passes nearer to each other where ridges stand above the
-//! target, or all farther apart where none comes near it.
+//! The loop: plan, cut, measure the ridges, and plan again with passes nearer to each other where ridges
+//! stand above the target, or all farther apart where none comes near it.
 //!
-//! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans with its measurement, and what each
-//! round found.
+//! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans with its
+//! measurement, and what each round found.
 //!
-//! Moves go a little deeper beside places that stand a little too high, as far as the chord tolerance and the gouge tolerance allow. All
-//! passes stay where they are then, and nothing can rise. Plans that can be corrected so are made as if chords raised nothing. Few
-//! places that stand higher get short passes of their own, which leave all others where they are as well.
-//! Else levels are placed anew, narrower around the places that stood too high, of functions that are kept from round to round.
-//! Where many stand little above the target, the widths of the whole plan are scaled, which leaves its passes in shape; so
-//! they are where narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much.
+//! Moves go a little deeper beside places that stand a little too high, as far as the chord tolerance and the
+//! gouge tolerance allow. All passes stay where they are then, and nothing can rise. Plans that can be
+//! corrected so are made as if chords raised nothing. Few places that stand higher get short passes of their
+//! own, which leave all others where they are as well. Else levels are placed anew, narrower around the
+//! places that stood too high, of functions that are kept from round to round. Where many stand little above
+//! the target, the widths of the whole plan are scaled, which leaves its passes in shape; so they are where
+//! narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much.
 //!
-//! Where an engine tells ridges apart, the first rounds measure no more than those, on cells as coarse as show every pass. Then
-//! all is measured as the verdict is; what still stands above the target then is corrected as well.
+//! Where an engine tells ridges apart, the first rounds measure no more than those, on cells as coarse as
+//! show every pass. Then all is measured as the verdict is; what still stands above the target then is
+//! corrected as well.
 
 mod round;
 mod widths;
@@ -49,34 +51,37 @@ const MOST_ROUNDS: usize = 6;
 /// A plan whose highest ridge is within this share above the target is near to holding it.
 const NEAR: f64 = 0.06;
 
-/// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
+/// Most plans that are made again after all was measured: each costs as much as the whole run without
+/// correction.
 const MOST_MEASURED: usize = 3;
 
-/// The same while the best plan stands above the target by no more than [`NEAR`], or the last one took most of what the one before
-/// left.
+/// The same while the best plan stands above the target by no more than [`NEAR`], or the last one took most
+/// of what the one before left.
 const MOST_MEASURED_NEAR: usize = 8;
 
-/// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
-/// at the middle of it, since points and chords of a new plan lie elsewhere.
+/// A plan whose highest ridge is within this share below the target is as wide as it should be. What is
+/// corrected is aimed at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
-/// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where ridges are known less closely. With less, whole
-/// measurements are spent on a few per cent of length.
+/// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where ridges are known
+/// less closely. With less, whole measurements are spent on a few per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
-/// Moves go deeper until what is known of the ridges stands no higher than this share of the target: between the places that are known
-/// they rise by about as much as that leaves.
+/// Moves go deeper until what is known of the ridges stands no higher than this share of the target: between
+/// the places that are known they rise by about as much as that leaves.
 const LOWERED_TO: f64 = 0.985;
 
-/// Where moves go deeper later, widths leave this share of what they can: ridges of a new plan stand at other heights.
+/// Where moves go deeper later, widths leave this share of what they can: ridges of a new plan stand at other
+/// heights.
 const LOWERED_LATER: f64 = 0.4;
 
 /// Ridges are about equally high where half of their length stands no lower than this share of the highest.
 const EVENLY_HIGH: f64 = 0.95;
 
-/// What stands more times as high as the target is no matter of widths. Two rounds take an interval to a quarter by
-/// [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other widths do not cut it either.
-/// They cut no less deep either where a plan cuts deeper by as many times than it may.
+/// What stands more times as high as the target is no matter of widths. Two rounds take an interval to a
+/// quarter by [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other
+/// widths do not cut it either. They cut no less deep either where a plan cuts deeper by as many times than
+/// it may.
 const NEVER_CUT: f64 = 16.0;
 
 /// A plan that leaves no more than so many times what every path leaves is not made better.
@@ -94,7 +99,8 @@ const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 /// A plan is as it was where its length changed by no more than this share of what its widths did.
 const AS_BEFORE: f64 = 0.01;
 
-/// A cube with the edge of an interval takes at most so many intervals of a pass of its own under a cutter that leans.
+/// A cube with the edge of an interval takes at most so many intervals of a pass of its own under a cutter
+/// that leans.
 const TOUCH_UP_LENGTH: f64 = 3.0;
 
 /// Passes of their own and the ways to them are no longer in all than this share of the path.
@@ -170,7 +176,8 @@ impl Standing {
         Self { round, above, depth, unreached }.on_faces(&planned.plan.kept.faces, wanted)
     }
 
-    /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once those are cut.
+    /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once
+    /// those are cut.
     fn on_faces(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
         if *faces == Faces::ALL {
             return self;
@@ -248,19 +255,22 @@ struct Corrected<'a> {
     tried: Tried,
     /// How the last plan was tried, where that is not the best one.
     latest: Option<Tried>,
-    /// What a plan that holds the target was planned by, as far as ridges tell, before a wider one took its place.
+    /// What a plan that holds the target was planned by, as far as ridges tell, before a wider one took its
+    /// place.
     narrower: Option<Widths>,
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
-    /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells show.
+    /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells
+    /// show.
     is_complete: bool,
     /// Whether every path of the cutter leaves more than the target somewhere.
     is_hopeless: bool,
 }
 
 impl Session {
-    /// Plans, cuts and measures one toolpath behind `earlier` ones, in rounds where what is left is to be corrected.
+    /// Plans, cuts and measures one toolpath behind `earlier` ones, in rounds where what is left is to be
+    /// corrected.
     pub(crate) fn plan_and_measure(
         &self,
         request: &ToolpathRequest,
@@ -342,7 +352,8 @@ impl Session {
         Ok((best, measured, covered))
     }
 
-    /// Measures the whole surface that a path leaves behind `earlier` ones, where no cell sees as well unless the rest fails for certain.
+    /// Measures the whole surface that a path leaves behind `earlier` ones, where no cell sees as well unless
+    /// the rest fails for certain.
     pub(crate) fn look(
         &self,
         request: &ToolpathRequest,
@@ -367,7 +378,8 @@ impl Session {
         Ok(Looked { measured, is_as_verdict, covered })
     }
 
-    /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse cells cannot tell.
+    /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse
+    /// cells cannot tell.
     fn ridges(
         &self,
         request: &ToolpathRequest,
@@ -395,13 +407,15 @@ impl Session {
         of_task(&task).map_err(|reason| JobError::engine(scene, &request.name, reason))
     }
 
-    /// Whether moves of a toolpath can go deeper beside places that stand a little too high. Those of a tool that leans cannot.
+    /// Whether moves of a toolpath can go deeper beside places that stand a little too high. Those of a tool
+    /// that leans cannot.
     fn may_lower(&self, request: &ToolpathRequest) -> bool {
         request.correct && request.axis.is_none() && self.pocket.is_none()
     }
 
-    /// Whether a toolpath is planned as if chords raised nothing. The gouge tolerance has to leave moves the room for it; and where all has
-    /// to be measured to find such places, passes that leave none take less time.
+    /// Whether a toolpath is planned as if chords raised nothing. The gouge tolerance has to leave moves the
+    /// room for it; and where all has to be measured to find such places, passes that leave none take less
+    /// time.
     pub(crate) fn is_lowered_later(&self, request: &ToolpathRequest) -> bool {
         let tolerance = &self.scene.tolerance;
         self.may_lower(request)
@@ -425,7 +439,8 @@ impl Corrected<'_> {
         Wanted { part: &self.session.part, target: self.goal.target, behind_others }
     }
 
-    /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the `slack`.
+    /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the
+    /// `slack`.
     fn by_ridges(&mut self, mut slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
         if self.is_too_hollow(monitor)? {
             return Ok(());
@@ -452,8 +467,9 @@ impl Corrected<'_> {
         Ok(())
     }
 
-    /// The `next` widths; where they leave all passes where they are, what stands too high beside the ridges that coarse cells show is
-    /// served as well. Where most ridges stand near the target, finding that takes as long as measuring all.
+    /// The `next` widths; where they leave all passes where they are, what stands too high beside the ridges
+    /// that coarse cells show is served as well. Where most ridges stand near the target, finding that takes
+    /// as long as measuring all.
     fn completed(&mut self, next: Widths, slack: f64, monitor: &dyn Monitor) -> Result<Widths, JobError> {
         let median = self.tried.standing.round.median_mm;
         let are_few_near = median.is_some_and(|median| median < EVENLY_HIGH * self.goal.target);
@@ -501,7 +517,8 @@ impl Corrected<'_> {
                     monitor,
                 )?;
                 let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
-                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that cuts too deep or leaves more uncut.
+                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that
+                // cuts too deep or leaves more uncut.
                 let (limits, best) = (&self.session.scene.tolerance, &self.tried.standing);
                 let is_deeper = found.depth > limits.gouge && best.depth <= limits.gouge;
                 let leaves_more = found.unreached > limits.uncut && best.unreached <= limits.uncut;
@@ -526,8 +543,8 @@ impl Corrected<'_> {
         }
     }
 
-    /// Whether every path of an upright cutter leaves more than the target somewhere, and the best plan not much more:
-    /// nearer passes would make the path longer without end.
+    /// Whether every path of an upright cutter leaves more than the target somewhere, and the best plan not
+    /// much more: nearer passes would make the path longer without end.
     fn is_too_hollow(&mut self, monitor: &dyn Monitor) -> Result<bool, JobError> {
         let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
@@ -577,10 +594,11 @@ impl Corrected<'_> {
         self.tried.standing.depth > NEVER_CUT * self.session.scene.tolerance.gouge
     }
 
-    /// The widths to try next. A plan that stands too high gets deeper moves where that is enough, and narrower widths
-    /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
-    /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, where once
-    /// may be enough, to which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
+    /// The widths to try next. A plan that stands too high gets deeper moves where that is enough, and
+    /// narrower widths elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan,
+    /// so that other places may stand too high then: these are narrowed as well, from the last plan on. Last
+    /// of all everything is narrowed in proportion, where once may be enough, to which remnants along borders
+    /// give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
     /// it, where it is far off in many places, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
@@ -613,8 +631,9 @@ impl Corrected<'_> {
         }
     }
 
-    /// Few places that stand too high get passes of their own, once, or else those that were never cut. `None` where these are many,
-    /// which nearer passes do not cut either, or where the plan cuts far too deep.
+    /// Few places that stand too high get passes of their own, once, or else those that were never cut.
+    /// `None` where these are many, which nearer passes do not cut either, or where the plan cuts far too
+    /// deep.
     fn far_off_served(&self, in_vain: usize) -> Option<Widths> {
         let Tried { widths, standing, .. } = &self.tried;
         if in_vain > 0 || !standing.round.measured || self.is_far_too_deep() {
@@ -629,12 +648,13 @@ impl Corrected<'_> {
         })
     }
 
-    /// Whether the best plan may hold the target with wider intervals, by one pass less at least: where ridges are about equally
-    /// high, passes are spread evenly, and each interval then grows by as much as all of them.
+    /// Whether the best plan may hold the target with wider intervals, by one pass less at least: where
+    /// ridges are about equally high, passes are spread evenly, and each interval then grows by as much as
+    /// all of them.
     fn may_lie_wider(&self) -> bool {
         let round = &self.tried.standing.round;
-        // What others cut before tells nothing of its own passes; where they leave ground to others, walls are not looked at. Without
-        // ridges there is nothing to tell by.
+        // What others cut before tells nothing of its own passes; where they leave ground to others, walls
+        // are not looked at. Without ridges there is nothing to tell by.
         let tells_nothing = self.request.stock_is_previous || round.highest_mm == 0.0;
         if tells_nothing || self.best.plan.kept.faces.most < 1.0 {
             return false;
@@ -650,8 +670,8 @@ impl Corrected<'_> {
         self.rounds.iter().any(|round| !round.holds(&self.goal) && round.factors[1] <= least)
     }
 
-    /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones left the plan as it
-    /// was, by half of what surely adds a pass.
+    /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones
+    /// left the plan as it was, by half of what surely adds a pass.
     fn scaled(&self, widths: &Widths, height: f64) -> Widths {
         let factor = (self.brought_to(widths, height) / height).sqrt();
         let passes = path_figures(&self.best.plan.path, 0.0).passes as f64;
@@ -659,7 +679,8 @@ impl Corrected<'_> {
         widths.scaled(if factor < 1.0 { factor.min(one_more).max(MOST_NARROWED) } else { factor })
     }
 
-    /// The height, mm, that widths are to bring another to: deeper moves take what is left then, unless they did already.
+    /// The height, mm, that widths are to bring another to: deeper moves take what is left then, unless they
+    /// did already.
     fn brought_to(&self, widths: &Widths, height: f64) -> f64 {
         let aim = aim(self.goal.target);
         let is_left = self.session.may_lower(self.request) && widths.lowered.is_empty();
@@ -675,9 +696,9 @@ impl Corrected<'_> {
         })
     }
 
-    /// The widths of a plan corrected by the places where it leaves too much: by deeper moves, and by passes of their own for few that
-    /// stand too high for that, once. Many get narrower widths, all of the plan where they stand little above the target. `None`
-    /// without such places.
+    /// The widths of a plan corrected by the places where it leaves too much: by deeper moves, and by passes
+    /// of their own for few that stand too high for that, once. Many get narrower widths, all of the plan
+    /// where they stand little above the target. `None` without such places.
     fn corrected(&self, tried: &Tried, in_vain: usize) -> Option<Widths> {
         let Tried { widths, .. } = tried;
         let near = self.standing_near(tried);
@@ -710,8 +731,8 @@ impl Corrected<'_> {
         Some(widths.narrowed(&high))
     }
 
-    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to leave it as well, with what
-    /// arcs may lead the tool astray.
+    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to
+    /// leave it as well, with what arcs may lead the tool astray.
     fn room(&self) -> f64 {
         let scene = &self.session.scene;
         let (tolerance, strays) = (&scene.tolerance, scene.arcs.unwrap_or(0.0));
@@ -733,8 +754,8 @@ impl Corrected<'_> {
             && widths.depth_at(place) + place.over.max(0.0) + 2.0 * ROUNDING <= self.room()
     }
 
-    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other, or than may be
-    /// where such plans were in vain.
+    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer
+    /// to each other, or than may be where such plans were in vain.
     fn are_few(&self, places: &[HighPlace], tried: &Tried, is_in_vain: bool) -> bool {
         let Widths { interval, .. } = tried.widths;
         let planned = &tried.kept.passes;
@@ -812,8 +833,8 @@ impl Corrected<'_> {
         Ok(looked)
     }
 
-    /// Whether all widths of a plan differ from those of the best, and no more than the ends of passes: they are spread over a
-    /// part, a whole number of them, and it leaves what the best one leaves.
+    /// Whether all widths of a plan differ from those of the best, and no more than the ends of passes: they
+    /// are spread over a part, a whole number of them, and it leaves what the best one leaves.
     fn is_left_as_before(&self, planned: &Planned, factors: [f64; 2]) -> bool {
         let before = &self.tried.standing.round;
         let [least, most] = changes(factors, before.factors);
@@ -875,7 +896,8 @@ fn changes(factors: [f64; 2], others: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|k| (factors[k] / others[k] - 1.0).abs())
 }
 
-/// Whether widths that differ by this share, on a path this many times as long, changed no more than the ends of passes.
+/// Whether widths that differ by this share, on a path this many times as long, changed no more than the ends
+/// of passes.
 fn are_ends_alone(widths: f64, length: f64) -> bool {
     widths > 0.0 && (length - 1.0).abs() <= AS_BEFORE * widths
 }
@@ -938,8 +960,8 @@ mod tests {
         assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
     }
 
-    /// On a slope of one degree the rim of a flat is an arc of r/sin 1° across the feed along the slope: strips of 6.8 mm, and the low edge is cut
-    /// by passes that run on until the rim has left it.
+    /// On a slope of one degree the rim of a flat is an arc of r/sin 1° across the feed along the slope:
+    /// strips of 6.8 mm, and the low edge is cut by passes that run on until the rim has left it.
     #[test]
     fn a_flat_end_takes_the_strips_that_it_has() {
         for toolpath in ["iso-scallop", "streamline", "iso-parametric"] {
@@ -954,8 +976,8 @@ mod tests {
         }
     }
 
-    /// A spiral leaves a corner of the part by a turn that stands 18 times as high as the target there: no width matters, and a short pass of
-    /// its own cuts it.
+    /// A spiral leaves a corner of the part by a turn that stands 18 times as high as the target there: no
+    /// width matters, and a short pass of its own cuts it.
     #[test]
     fn a_corner_that_was_never_cut_gets_a_pass_of_its_own() {
         let text = "[part]\nsurface = \"wave\"\namplitude = 0.5\nwavelength_x = 12\nx = [-4, 4]\ny = [-3, 3]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\

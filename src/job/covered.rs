@@ -14,8 +14,8 @@ use work::monitor::Monitor;
 use super::tool::ToolMoves;
 use super::{JobError, Session, judge};
 
-/// Where a limit is undecided on surface that no cell sees, it is measured again by places half as far apart, so often. Each time takes
-/// up to four times as long.
+/// Where a limit is undecided on surface that no cell sees, it is measured again by places half as far apart,
+/// so often. Each time takes up to four times as long.
 const MOST_HALVINGS: i32 = 2;
 
 /// The error bound that is asked for is smaller by this each time.

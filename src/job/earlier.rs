@@ -1,7 +1,8 @@
 //! Toolpaths that cut the same block one after the other: `stock = "previous"`.
 //!
-//! The surface that is judged is what all of them leave. So what is measured are their moves as one path; lengths, times,
-//! removal and clearance are those of the last toolpath's own moves, in the stock that those before it left.
+//! The surface that is judged is what all of them leave. So what is measured are their moves as one path;
+//! lengths, times, removal and clearance are those of the last toolpath's own moves, in the stock that those
+//! before it left.
 
 use std::borrow::Cow;
 
@@ -67,7 +68,8 @@ impl<'a> WholePath<'a> {
         Self { path: Cow::Owned(whole.finish()), cutters: all, firsts }
     }
 
-    /// The moves of each tool of each toolpath; the rapids between them are left out. `own` are those of the last one.
+    /// The moves of each tool of each toolpath; the rapids between them are left out. `own` are those of the
+    /// last one.
     pub fn tools<'b>(&self, earlier: &'b [EarlierPath], own: &'b [ToolMoves<'b>]) -> Vec<ToolMoves<'b>> {
         let of_one = |before: &'b EarlierPath| ToolMoves::of(&before.cutters, &before.holders, &before.path);
         let all = earlier.iter().map(of_one).chain([own.to_vec()]);

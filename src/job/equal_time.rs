@@ -1,8 +1,10 @@
 //! Planning for a machining time: the scallop height whose plan takes it, links and all.
 //!
-//! A path is about as long as its passes are many, and they are so many as the inverse root of the scallop height: the density. Time grows
-//! with the density and has a part that does not. So the search goes by the secant of time over density, and between two plans that lie to both sides of the
-//! time by their chord. Whole passes come and go by steps: where two neighbouring densities lie to both sides of it, no plan is nearer.
+//! A path is about as long as its passes are many, and they are so many as the inverse root of the scallop
+//! height: the density. Time grows with the density and has a part that does not. So the search goes by the
+//! secant of time over density, and between two plans that lie to both sides of the time by their chord.
+//! Whole passes come and go by steps: where two neighbouring densities lie to both sides of it, no plan is
+//! nearer.
 
 use serde::Serialize;
 
@@ -26,10 +28,12 @@ const MOST_STRETCH: f64 = 4.0;
 /// Densities that differ by a smaller share have the same passes, or one more.
 const CLOSEST: f64 = 1e-3;
 
-/// The next density keeps this share of the interval away from both of its ends, so that the interval shrinks.
+/// The next density keeps this share of the interval away from both of its ends, so that the interval
+/// shrinks.
 const INSIDE: f64 = 0.1;
 
-/// The highest scallop, as a share of the cutter's corner radius: passes that leave higher ones hardly touch each other.
+/// The highest scallop, as a share of the cutter's corner radius: passes that leave higher ones hardly touch
+/// each other.
 const HIGHEST: f64 = 0.25;
 
 /// A plan of the search.
@@ -113,8 +117,8 @@ impl Session {
     }
 }
 
-/// The plan that is nearest to the time asked for, s, as it was tried, and all that were: by heights from `first` on, none above
-/// `highest`, mm.
+/// The plan that is nearest to the time asked for, s, as it was tried, and all that were: by heights from
+/// `first` on, none above `highest`, mm.
 fn nearest<P, E>(
     first: f64,
     highest: f64,

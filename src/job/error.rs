@@ -212,7 +212,8 @@ fn listed(reasons: &[(String, String)]) -> String {
 }
 
 impl JobError {
-    /// Why no toolpath has a path: the error of the only one, or the reasons of all, each with the toolpath's name.
+    /// Why no toolpath has a path: the error of the only one, or the reasons of all, each with the toolpath's
+    /// name.
     pub(crate) fn of_all(scene: &Scene, mut refused: Vec<(String, Self)>) -> Self {
         if refused.len() == 1 {
             return refused.remove(0).1;

@@ -23,11 +23,12 @@ use super::tool::{Around, Tool, ToolMoves};
 use super::{JobError, Machined, Outcome, Session, figures, judge};
 
 impl Session {
-    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
-    /// planned is a row with its reason, and fails the run.
+    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that
+    /// cannot be planned is a row with its reason, and fails the run.
     ///
     /// # Errors
-    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned, with the reason of each.
+    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned, with the reason of
+    /// each.
     pub fn run(&self, monitor: &dyn Monitor) -> Result<RunReport, JobError> {
         self.run_each(monitor, &mut |_| Ok::<(), JobError>(()))
     }
@@ -96,7 +97,8 @@ impl Session {
         RunReport { inputs: self.inputs.clone(), notes: self.doubt.iter().cloned().collect(), ..report }
     }
 
-    /// Plans, cuts, measures and judges one toolpath; where it cuts what others left, those are planned before it.
+    /// Plans, cuts, measures and judges one toolpath; where it cuts what others left, those are planned
+    /// before it.
     ///
     /// # Errors
     /// [`JobError`]

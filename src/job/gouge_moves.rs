@@ -15,8 +15,8 @@ pub(crate) struct OwnMoves<'a> {
     pub cutters: &'a Cutters,
 }
 
-/// Names the moves of gouges, which are told by their index in the `whole` path. Where stock itself lies below the part
-/// no move cut.
+/// Names the moves of gouges, which are told by their index in the `whole` path. Where stock itself lies
+/// below the part no move cut.
 pub(crate) fn name(
     regions: &mut [GougeRegion],
     whole: &WholePath<'_>,
@@ -36,8 +36,8 @@ pub(crate) fn name(
     }
 }
 
-/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line before where the
-/// move begins there.
+/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line
+/// before where the move begins there.
 fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
     /// Places along the move; a start that is lowest by less than a share of it counts as its end.
     const PLACES: u32 = 64;

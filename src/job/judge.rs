@@ -1,11 +1,13 @@
 //! The rule by which a toolpath passes: every figure, with the bound of its error, within its limit.
 //!
-//! Each limit is a [`Claim`]. It holds where figure and bound lie within it, is violated where the figure less its bound
-//! exceeds it, or what is there for certain does, and is undecided otherwise; coarser cells widen bounds, so they may turn an
-//! answer into no answer and never into the other one. The limits of the measured surface:
+//! Each limit is a [`Claim`]. It holds where figure and bound lie within it, is violated where the figure
+//! less its bound exceeds it, or what is there for certain does, and is undecided otherwise; coarser cells
+//! widen bounds, so they may turn an answer into no answer and never into the other one. The limits of the
+//! measured surface:
 //!
-//! - scallop: no ridge and no remnant along a border exceeds the scallop tolerance times the factor that the scene allows,
-//!   and the share of the ridge length that the scene names does not exceed the tolerance itself;
+//! - scallop: no ridge and no remnant along a border exceeds the scallop tolerance times the factor that the
+//!   scene allows, and the share of the ridge length that the scene names does not exceed the tolerance
+//!   itself;
 //! - gouge: no place lies deeper than the gouge tolerance;
 //! - uncut: no other material stands higher than the uncut tolerance.
 //!
@@ -14,7 +16,8 @@
 use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 
-/// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are of `program`.
+/// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are
+/// of `program`.
 pub(crate) fn judge(
     measured: &Measurement,
     limits: &Limits,
@@ -37,7 +40,8 @@ pub(crate) fn judge(
 const STRAYS: &str = "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine], or shorter moves where axes \
                       turn, would decide it";
 
-/// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves that are measured.
+/// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves
+/// that are measured.
 pub(crate) fn name_strays(claims: &mut [Claim], strays: f64) {
     let hangs_on_it = |claim: &Claim| {
         let nearer = Claim { error_bound: claim.error_bound - strays, ..claim.clone() };
@@ -107,7 +111,8 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     Claim { measured: known(measured, height), ..claim("uncut", limits.uncut, &all) }.told(text)
 }
 
-/// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a border.
+/// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a
+/// border.
 pub(crate) fn highest_reached(measured: &Measurement) -> Bounded {
     let figures = &measured.scallop;
     let ridges = figures.max_mm.map(|height| Bounded {

@@ -1,7 +1,8 @@
 //! A job: a scene in, plain report data out. Nothing is written and nothing is printed here.
 //!
-//! One way leads through it for every engine and for pockets: plan, cut, measure, find further figures, judge. A figure of
-//! the report is one file in `figures` and one line in their list; the rule by which a toolpath passes stands in `judge`.
+//! One way leads through it for every engine and for pockets: plan, cut, measure, find further figures,
+//! judge. A figure of the report is one file in `figures` and one line in their list; the rule by which a
+//! toolpath passes stands in `judge`.
 
 mod correction;
 mod covered;

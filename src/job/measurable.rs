@@ -8,7 +8,8 @@ use super::earlier::EarlierPath;
 use super::{JobError, Session};
 
 impl Session {
-    /// Refuses a toolpath that its engine cannot measure in the stock of the scene, with its tools or behind `earlier` ones.
+    /// Refuses a toolpath that its engine cannot measure in the stock of the scene, with its tools or behind
+    /// `earlier` ones.
     pub(crate) fn refuse_unmeasured(
         &self,
         request: &ToolpathRequest,

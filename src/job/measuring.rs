@@ -7,12 +7,14 @@ use work::monitor::Monitor;
 
 use super::{JobError, Session, judge};
 
-/// The cell shrinks to this share where a limit is undecided, and at once to what suits the scene where that is smaller:
-/// cells that show no pass decide little, and take longer. Nearer to 1 more cuts are made in vain, nearer to 0 more cells.
+/// The cell shrinks to this share where a limit is undecided, and at once to what suits the scene where that
+/// is smaller: cells that show no pass decide little, and take longer. Nearer to 1 more cuts are made in
+/// vain, nearer to 0 more cells.
 const FINER: f64 = 0.5;
 
-/// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first; the cell may
-/// be the finest already that suits the scene. It shrinks in them, too, up to so many cells: more take minutes.
+/// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first;
+/// the cell may be the finest already that suits the scene. It shrinks in them, too, up to so many cells:
+/// more take minutes.
 const CLOSER_ROUNDS: usize = 2;
 const MOST_CLOSER_CELLS: usize = 4_000_000;
 const CLOSEST_BOUND: f64 = 0.02;
@@ -22,14 +24,15 @@ const CLOSEST_BOUND: f64 = 0.02;
 pub(crate) enum Closeness {
     /// As the verdict needs it.
     Verdict,
-    /// No closer where the path is to be planned anew: its highest place stands above `limit`, mm, for certain. Where finer cells do not make
-    /// a look closer, another plan takes less time than that: it is enough that the place, known to `within` mm, may stand above.
+    /// No closer where the path is to be planned anew: its highest place stands above `limit`, mm, for
+    /// certain. Where finer cells do not make a look closer, another plan takes less time than that: it is
+    /// enough that the place, known to `within` mm, may stand above.
     Plan { within: f64, limit: f64 },
 }
 
 impl Closeness {
-    /// Whether no closer look is needed for a plan. Where `coarse` cells may tell heights that finer ones do not have, these have to be
-    /// known as closely as was `asked`, mm.
+    /// Whether no closer look is needed for a plan. Where `coarse` cells may tell heights that finer ones do
+    /// not have, these have to be known as closely as was `asked`, mm.
     fn is_enough(self, measured: &Measured, coarse: bool, asked: f64) -> bool {
         let highest = judge::highest_reached(&measured.measurement);
         match self {
@@ -50,8 +53,8 @@ pub(crate) struct MeasuredClosely {
 }
 
 impl Session {
-    /// Cuts and measures as closely as is asked; closer, and on finer cells where these help, where a limit hangs on that. The path may begin
-    /// with the moves of other toolpaths.
+    /// Cuts and measures as closely as is asked; closer, and on finer cells where these help, where a limit
+    /// hangs on that. The path may begin with the moves of other toolpaths.
     pub(crate) fn measure_closely(
         &self,
         request: &ToolpathRequest,
@@ -105,7 +108,8 @@ impl Session {
         Ok(MeasuredClosely { measured, is_as_verdict: true })
     }
 
-    /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the scene's scallop height.
+    /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the
+    /// scene's scallop height.
     fn own_cells(&self, request: &ToolpathRequest) -> Result<Option<(Simulation, LaidOut)>, JobError> {
         let scene = &self.scene;
         let cell = auto_cell(&scene.cutter, std::slice::from_ref(request));
@@ -118,8 +122,9 @@ impl Session {
     }
 }
 
-/// The next cell after one that left a limit undecided. Where few cells are enough, it is `finest`, which suits the scene, or
-/// half of the last cell if that is smaller. More cells are reached in steps and end at `finest`.
+/// The next cell after one that left a limit undecided. Where few cells are enough, it is `finest`, which
+/// suits the scene, or half of the last cell if that is smaller. More cells are reached in steps and end at
+/// `finest`.
 fn finer_cell(measured: &Measured, finest: f64, before: f64) -> f64 {
     let quick = before * (measured.cells as f64 / MOST_CLOSER_CELLS as f64).sqrt();
     let halved = FINER * before;

@@ -43,7 +43,8 @@ pub struct Outcome {
 }
 
 impl Session {
-    /// Writes the program of an outcome as G-code: nothing where the tool leans and the scene names no machine for it.
+    /// Writes the program of an outcome as G-code: nothing where the tool leans and the scene names no
+    /// machine for it.
     ///
     /// # Errors
     /// Those of `out`.

@@ -32,8 +32,8 @@ use super::{JobError, Session};
 /// One part in so many of the memory that the part leaves is for the tables of a plan.
 const PLAN_SHARE: u64 = 2;
 
-/// Share of the turning that was asked for which axes are planned by: moves take the chord of the contact's way, which is
-/// shorter than the way.
+/// Share of the turning that was asked for which axes are planned by: moves take the chord of the contact's
+/// way, which is shorter than the way.
 const TURNING_SHARE: f64 = 0.99;
 
 /// A planned toolpath as the machine runs it.
@@ -209,8 +209,9 @@ impl Session {
         Ok(Plan { path, notes, ..plan })
     }
 
-    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes (merged within a
-    /// share of the chord tolerance), slowed in corners, rounded; and how many moves are left out.
+    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control
+    /// takes (merged within a share of the chord tolerance), slowed in corners, rounded; and how many moves
+    /// are left out.
     fn as_written(&self, path: &Toolpath, share: f64) -> (Toolpath, usize) {
         let Scene { tolerance, machine, .. } = &self.scene;
         let straying = Straying { tolerance: tolerance.chord * share, length: cutting_length(&self.scene) };
@@ -252,7 +253,8 @@ impl Session {
         }
     }
 
-    /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool astray, or arcs an upright one.
+    /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool
+    /// astray, or arcs an upright one.
     pub(crate) fn aimed_at(&self, request: &ToolpathRequest) -> Step {
         let strays = if request.tilts() { may_stray(&self.scene) } else { self.scene.arcs.unwrap_or(0.0) };
         match request.step {
@@ -287,7 +289,8 @@ impl Session {
         header(&self.scene, name)
     }
 
-    /// Measures the engagement of a pocket's passes and lowers the feed where it is above the strategy's limit.
+    /// Measures the engagement of a pocket's passes and lowers the feed where it is above the strategy's
+    /// limit.
     fn limit_feed(
         &self,
         request: &ToolpathRequest,
@@ -302,7 +305,8 @@ impl Session {
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, self.scene.cutter.radius())))
     }
 
-    /// The engagement of a pocket's passes with all layers counted that may be chips, where one was asked for.
+    /// The engagement of a pocket's passes with all layers counted that may be chips, where one was asked
+    /// for.
     fn engaged_thinly(
         &self,
         request: &ToolpathRequest,
@@ -326,14 +330,14 @@ impl Session {
     }
 }
 
-/// Times that a toolpath is planned again whose axis turns too fast, and how much slower than it takes. Where it turns by more
-/// than so many times what is allowed the tool stays clear only so, and no plan helps.
+/// Times that a toolpath is planned again whose axis turns too fast, and how much slower than it takes. Where
+/// it turns by more than so many times what is allowed the tool stays clear only so, and no plan helps.
 const TURNING_ROUNDS: usize = 3;
 const TURNING_SPARE: f64 = 0.97;
 const TURNING_MOST: f64 = 10.0;
 
-/// The plan whose axes turn as slowly as asked. A bull nose end mill in a hollow may touch beside the contact that was planned,
-/// so that the finished path has other rates; it is then planned for lower ones.
+/// The plan whose axes turn as slowly as asked. A bull nose end mill in a hollow may touch beside the contact
+/// that was planned, so that the finished path has other rates; it is then planned for lower ones.
 fn within_turning(
     planned: &dyn Fn(f64) -> Result<Plan, PlanError>,
     turns: &dyn Fn(&Plan) -> Result<f64, PlanError>,
@@ -355,28 +359,30 @@ fn within_turning(
     Ok(best)
 }
 
-/// Share of the chord tolerance within which short moves are merged where the engagement is bounded: in acute tips some micrometres
-/// turn the chip by degrees.
+/// Share of the chord tolerance within which short moves are merged where the engagement is bounded: in acute
+/// tips some micrometres turn the chip by degrees.
 const BOUNDED_STRAYING: f64 = 0.2;
 
 /// A plan of a pocket with the engagement that was measured, and the bound of its greatest angle, rad.
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
-/// Times that a pocket is planned again for less where the engagement was exceeded; once more it is for a lower limit everywhere.
+/// Times that a pocket is planned again for less where the engagement was exceeded; once more it is for a
+/// lower limit everywhere.
 const GENTLE_ROUNDS: usize = 5;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
 
-/// No limit below this share of the one asked for, in all rounds together, around places or everywhere: the path would grow without
-/// end.
+/// No limit below this share of the one asked for, in all rounds together, around places or everywhere: the
+/// path would grow without end.
 const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
 
-/// Beyond a stretch that exceeded the limit, passes are planned for less this far, over the radius: there it is decided how they
-/// come to it.
+/// Beyond a stretch that exceeded the limit, passes are planned for less this far, over the radius: there it
+/// is decided how they come to it.
 const AROUND_EXCEEDING: f64 = 1.0;
 
-/// Adds lower limits around stretches that exceed the `limit`, rad, `over` by so much, for a cutter of some radius, mm.
+/// Adds lower limits around stretches that exceed the `limit`, rad, `over` by so much, for a cutter of some
+/// radius, mm.
 fn lower_around(
     gentle: &mut Vec<Gentle>,
     exceeding: &[Exceeding],
@@ -399,9 +405,9 @@ fn lower_around(
     }
 }
 
-/// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for less around the places where it
-/// does not, by as much as it was above there; at last one for a lower limit. It is taken if that helps; in slots without room it
-/// does not.
+/// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for less around
+/// the places where it does not, by as much as it was above there; at last one for a lower limit. It is taken
+/// if that helps; in slots without room it does not.
 fn within_engagement(
     first: Engaged,
     strategy: &dyn Strategy,
@@ -454,7 +460,8 @@ fn cutting_length(scene: &Scene) -> f64 {
 /// Joints follow a path within this share of the chord tolerance, by which all that is measured may be off.
 const FOLLOWED: f64 = 0.1;
 
-/// No plan aims at a lower scallop than this share of what is asked for. Where joints stray by more, no plan is known to hold it.
+/// No plan aims at a lower scallop than this share of what is asked for. Where joints stray by more, no plan
+/// is known to hold it.
 const LEAST_AIM: f64 = 0.5;
 
 /// How joints follow a path: the whole tool stays near the motion between locations that is measured.
@@ -486,7 +493,8 @@ fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath
     }
 }
 
-/// The line of each move in its program. A path that tilts the tool has no program where the scene names no machine.
+/// The line of each move in its program. A path that tilts the tool has no program where the scene names no
+/// machine.
 fn lines(
     scene: &Scene,
     path: &Toolpath,
@@ -506,8 +514,8 @@ fn header(scene: &Scene, name: &str) -> ProgramHeader {
     }
 }
 
-/// Writes a path as G-code; tells the line of each move. A path that tilts the tool has no program, and no lines, where the
-/// scene names no machine for it.
+/// Writes a path as G-code; tells the line of each move. A path that tilts the tool has no program, and no
+/// lines, where the scene names no machine for it.
 pub(crate) fn write_program(
     out: &mut dyn std::io::Write,
     scene: &Scene,

@@ -34,7 +34,8 @@ pub fn limit_feed_by(
 /// Distances from walls below this are rounding, mm.
 const ROUNDING: f64 = 1e-6;
 
-/// What is measured of a pocket besides its floor and the engagement, whoever planned the moves; `cut` is the stock that they leave.
+/// What is measured of a pocket besides its floor and the engagement, whoever planned the moves; `cut` is the
+/// stock that they leave.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -113,7 +114,8 @@ fn material_on_walls(
     search.run(&tools.collect::<Vec<_>>(), monitor)
 }
 
-/// The engagement of passes that `strategy` planned; each engagement is one with the bound of its greatest angle, rad.
+/// The engagement of passes that `strategy` planned; each engagement is one with the bound of its greatest
+/// angle, rad.
 pub(crate) fn engagement_figures(
     strategy: &PocketStrategy,
     step: Step,
@@ -162,7 +164,8 @@ fn stretch(one: &Exceeding, path: &Toolpath) -> ExceedingStretch {
     }
 }
 
-/// The engagement with layers counted down to [`THIN_LAYER`] of a `radius`, mm; `bound` is that of its greatest angle, rad.
+/// The engagement with layers counted down to [`THIN_LAYER`] of a `radius`, mm; `bound` is that of its
+/// greatest angle, rad.
 fn thin_layers(engaged: &Engagement, bound: f64, radius: f64, path: &Toolpath) -> ThinLayers {
     let above = &engaged.exceeding;
     ThinLayers {

@@ -24,8 +24,9 @@ use super::{JobError, judge, units};
 /// Thickness of stock and machined part below the lowest place of the part, mm.
 pub(crate) const BASE: f64 = 5.0;
 
-/// Share of the gouge tolerance that triangles may stand off the patches which tools are kept away from. The plan uses half
-/// of the tolerance for itself, and triangles may stand off to either side. Less takes more triangles.
+/// Share of the gouge tolerance that triangles may stand off the patches which tools are kept away from. The
+/// plan uses half of the tolerance for itself, and triangles may stand off to either side. Less takes more
+/// triangles.
 const NEAREST_SHARE: f64 = 0.125;
 
 /// A scene with its part: what all its toolpaths share.
@@ -233,8 +234,8 @@ impl Session {
         })?
     }
 
-    /// The part with triangles so near to its patches that a tool which is kept off the triangles stays within the gouge
-    /// tolerance of the patches; `None` where the part's own do.
+    /// The part with triangles so near to its patches that a tool which is kept off the triangles stays
+    /// within the gouge tolerance of the patches; `None` where the part's own do.
     pub(crate) fn closer_part(&self, monitor: &dyn Monitor) -> Result<Option<Part>, Cancelled> {
         let nearest = NEAREST_SHARE * self.scene.tolerance.gouge;
         if self.part.mesh_deviation() <= nearest {
@@ -286,7 +287,8 @@ impl Session {
         Ok(engine)
     }
 
-    /// The cutters of a toolpath and what holds each: those of its program where all tools of one are meant, else the scene's.
+    /// The cutters of a toolpath and what holds each: those of its program where all tools of one are meant,
+    /// else the scene's.
     pub(crate) fn tools<'a>(&'a self, request: &'a ToolpathRequest) -> (&'a Cutters, &'a [Option<Holder>]) {
         let of_program = request.foreign().and_then(|read| read.tools.as_ref());
         let of_scene = || (&self.cutters, std::slice::from_ref(&self.scene.holder));

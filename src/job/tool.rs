@@ -36,9 +36,9 @@ impl Tool {
         Self { cutter: Solid::of_cutter(cutter, holder), holder: holder.map(Solid::of_holder) }
     }
 
-    /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and from cutting
-    /// deeper into the part than half the gouge tolerance and what the part's triangles are off its surface. Joints may lead all of it
-    /// astray.
+    /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and
+    /// from cutting deeper into the part than half the gouge tolerance and what the part's triangles are off
+    /// its surface. Joints may lead all of it astray.
     pub fn keep_clear<'a>(
         &'a self,
         scene: &Scene,

@@ -1,15 +1,15 @@
-//! Whether part and cutter can belong together. A file in another unit than the scene says is wrong by a factor of 25
-//! or 1000; every figure of such a run would hold, and mean nothing.
+//! Whether part and cutter can belong together. A file in another unit than the scene says is wrong by a
+//! factor of 25 or 1000; every figure of such a run would hold, and mean nothing.
 
 use part::Part;
 use scene::{PartSource, Scene};
 
-/// A part below this share of the cutter's diameter is beyond belief. Greater, small pads are doubted; smaller, parts in
-/// metres go unnoticed.
+/// A part below this share of the cutter's diameter is beyond belief. Greater, small pads are doubted;
+/// smaller, parts in metres go unnoticed.
 const SMALLEST: f64 = 0.25;
 
-/// A part above so many diameters of the cutter is beyond belief. Less, long parts are doubted; more, parts in micrometres
-/// go unnoticed.
+/// A part above so many diameters of the cutter is beyond belief. Less, long parts are doubted; more, parts
+/// in micrometres go unnoticed.
 const LARGEST: f64 = 1e4;
 
 /// What is to be said of sizes beyond belief.

@@ -1,7 +1,7 @@
 //! Texts that a terminal, a page or a log shows and never obeys.
 
-/// Turns of the direction of writing: with them a name can show other than it is (Boucher and Anderson, Trojan Source,
-/// 2021).
+/// Turns of the direction of writing: with them a name can show other than it is (Boucher and Anderson,
+/// Trojan Source, 2021).
 const TURNS: [std::ops::RangeInclusive<char>; 2] = ['\u{202a}'..='\u{202e}', '\u{2066}'..='\u{2069}'];
 
 fn shown(c: char) -> char {

@@ -304,7 +304,8 @@ impl<'a> Section<'a> {
         self.numbers(key, &LENGTH, " mm")
     }
 
-    /// Finite numbers within `range`, as `[0.4, 0.2]`; none when the key is not there. `unit` as in [`Self::number`].
+    /// Finite numbers within `range`, as `[0.4, 0.2]`; none when the key is not there. `unit` as in
+    /// [`Self::number`].
     pub fn numbers(
         &self,
         key: &str,
@@ -409,8 +410,8 @@ impl<'a> Section<'a> {
         Ok(Located { value: rows.value.into_iter().map(Point2::from).collect(), span: rows.span })
     }
 
-    /// Rows of as many numbers, `[[…], …]`, none of them beyond what coordinates may be; `None` when the key is not there.
-    /// `what` completes the sentence "expected …".
+    /// Rows of as many numbers, `[[…], …]`, none of them beyond what coordinates may be; `None` when the key
+    /// is not there. `what` completes the sentence "expected …".
     pub fn rows<const N: usize>(
         &self,
         key: &str,

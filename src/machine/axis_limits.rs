@@ -1,14 +1,15 @@
 //! Speeds along a path at which every axis of a machine keeps its acceleration, and the time that they take.
 //!
-//! Enters: stages of a path, from rest to rest, each with its length and the way of every axis in it. Leaves: the squared speed
-//! of the tip at the ends of the stages. With the squared speed x and the acceleration u of the tip along the path, an axis
-//! accelerates by `q′ u + q″ x`, primes for derivatives by the length: limits are linear in both. The greatest speeds follow in
-//! one sweep backward, for what can still be braked, and one forward, for what can have been reached (H. Pham and Q.-C. Pham,
-//! "A new approach to time-optimal path parameterization based on reachability analysis", 2018).
+//! Enters: stages of a path, from rest to rest, each with its length and the way of every axis in it. Leaves:
+//! the squared speed of the tip at the ends of the stages. With the squared speed x and the acceleration u of
+//! the tip along the path, an axis accelerates by `q′ u + q″ x`, primes for derivatives by the length: limits
+//! are linear in both. The greatest speeds follow in one sweep backward, for what can still be braked, and
+//! one forward, for what can have been reached (H. Pham and Q.-C. Pham, "A new approach to time-optimal path
+//! parameterization based on reachability analysis", 2018).
 //!
-//! u is constant within a stage. At a corner q′ changes over half of the pieces beside it, as in [`super::time`]. Where axes have
-//! a limit of jerk, [`super::jerk`] lowers the speeds further. [`slow_axes`] writes the speeds into the feeds of a path.
-//! Lengths in mm, speeds in mm/s; axes in mm or rad.
+//! u is constant within a stage. At a corner q′ changes over half of the pieces beside it, as in
+//! [`super::time`]. Where axes have a limit of jerk, [`super::jerk`] lowers the speeds further. [`slow_axes`]
+//! writes the speeds into the feeds of a path. Lengths in mm, speeds in mm/s; axes in mm or rad.
 
 use super::blending::{Arcs, Straight};
 use super::feeds::{ANY_RATE, in_series};
@@ -32,8 +33,8 @@ const SMOOTH: f64 = 0.5;
 /// Rounding of accelerations over their limits.
 const ROUNDING: f64 = 1e-9;
 
-/// Rotary axes turn by no more than this between two places at which the linear axes are told, rad, where the control keeps the
-/// tip on its line.
+/// Rotary axes turn by no more than this between two places at which the linear axes are told, rad, where the
+/// control keeps the tip on its line.
 const TURN: f64 = 0.02;
 
 /// Places on one move at most.
@@ -66,8 +67,8 @@ impl EvenStretch {
     }
 }
 
-/// What single axes allow: X, Y, Z and two rotary ones. Rates in mm/s or rad/s, accelerations in mm/s² or rad/s², jerks in mm/s³
-/// or rad/s³; what is infinite limits nothing.
+/// What single axes allow: X, Y, Z and two rotary ones. Rates in mm/s or rad/s, accelerations in mm/s² or
+/// rad/s², jerks in mm/s³ or rad/s³; what is infinite limits nothing.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AxisLimits {
     pub rates: [f64; 5],
@@ -93,8 +94,8 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Its time, s, between squared speeds. From and to rest an acceleration that rises evenly takes half as long again as an even
-    /// one.
+    /// Its time, s, between squared speeds. From and to rest an acceleration that rises evenly takes half as
+    /// long again as an even one.
     pub fn time(&self, [begin, end]: [f64; 2]) -> f64 {
         let even = 2.0 * self.length / (begin.sqrt() + end.sqrt());
         if self.jerk && (begin == 0.0 || end == 0.0) { 1.5 * even } else { even }
@@ -142,9 +143,9 @@ impl Run {
     }
 }
 
-/// Time for the whole path, s, on a machine whose axes keep their rates, accelerations and jerks, besides all that
-/// [`super::machining_time`] looks at. The machine stops where rotary axes turn about a tip that stands; rises for rewinds are
-/// not counted. Infinite where [`super::machining_time`] is.
+/// Time for the whole path, s, on a machine whose axes keep their rates, accelerations and jerks, besides all
+/// that [`super::machining_time`] looks at. The machine stops where rotary axes turn about a tip that stands;
+/// rises for rewinds are not counted. Infinite where [`super::machining_time`] is.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -198,9 +199,9 @@ fn linear(blocks: &[Block], machine: &Machine, monitor: &dyn Monitor) -> Result<
     Run::new(&pieces, machine, &axes, monitor)
 }
 
-/// The path with feeds of its cuts and links at which all axes can be run, on the series of [`super::slow_corners`]. No time grows
-/// by them: a move keeps the greatest speed that the machine reaches in it. Rapids, plunges and lifts stay as they are, and so does a
-/// path for which no time can be told.
+/// The path with feeds of its cuts and links at which all axes can be run, on the series of
+/// [`super::slow_corners`]. No time grows by them: a move keeps the greatest speed that the machine reaches
+/// in it. Rapids, plunges and lifts stay as they are, and so does a path for which no time can be told.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -347,8 +348,8 @@ fn stages(pieces: &[EvenStretch], machine: &Machine, axes: &AxisLimits) -> Vec<S
         let (last, halves) = (lengths.len() - 1, lengths.len() == 2);
         let mut begin = 0.0;
         for (k, length) in lengths.into_iter().enumerate() {
-            // The bend at a corner reaches half-way into the pieces beside, but behind a sharp one not along those that the machine
-            // needs to speed up.
+            // The bend at a corner reaches half-way into the pieces beside, but behind a sharp one not along
+            // those that the machine needs to speed up.
             let half = usize::from(2 * k > last);
             let bends = match k {
                 _ if halves || smooth[half] => [bends[half]; 2],
@@ -377,7 +378,8 @@ fn is_smooth(last: &EvenStretch, next: &EvenStretch) -> bool {
     !next.after_stop && norm(&changes) < SMOOTH * norm(&size)
 }
 
-/// How axes bend at the corner between two pieces: their slopes change over half of both. Where the tip stands, nothing bends.
+/// How axes bend at the corner between two pieces: their slopes change over half of both. Where the tip
+/// stands, nothing bends.
 fn bend(last: &EvenStretch, next: &EvenStretch) -> [f64; 5] {
     if next.after_stop {
         return [0.0; 5];
@@ -445,8 +447,8 @@ struct Limits<'a> {
 }
 
 impl Limits<'_> {
-    /// Least and greatest acceleration of the tip in a stage that begins with the squared speed `x` and ends with no more than
-    /// `end`; the least is above the greatest where there is none.
+    /// Least and greatest acceleration of the tip in a stage that begins with the squared speed `x` and ends
+    /// with no more than `end`; the least is above the greatest where there is none.
     fn window(&self, k: usize, x: f64, end: f64) -> [f64; 2] {
         let stage = &self.stages[k];
         let twice = 2.0 * stage.length;

@@ -1,10 +1,11 @@
 //! How a control shares acceleration where it rounds corners by arcs.
 //!
-//! Enters: stretches with the speeds at their corners. Leaves: what of each stretch belongs to arcs, and the acceleration along it
-//! there. The planner of LinuxCNC (G64 P) puts an arc into each corner. In the arc's plane the axes allow a circle of
-//! accelerations, the least of their limits there. √3/2 of it is for the bend and half of it for speeding up, so that both together
-//! stay within. An arc takes in what is left of the line before it where that lasts less than a few cycles of the control.
-//! So a chain of short chords speeds up with half of what its slowest axis allows.
+//! Enters: stretches with the speeds at their corners. Leaves: what of each stretch belongs to arcs, and the
+//! acceleration along it there. The planner of LinuxCNC (G64 P) puts an arc into each corner. In the arc's
+//! plane the axes allow a circle of accelerations, the least of their limits there. √3/2 of it is for the
+//! bend and half of it for speeding up, so that both together stay within. An arc takes in what is left of
+//! the line before it where that lasts less than a few cycles of the control. So a chain of short chords
+//! speeds up with half of what its slowest axis allows.
 
 use super::Machine;
 use geometry::Vector3;
@@ -23,7 +24,8 @@ pub enum Blending {
 const ACROSS: f64 = 0.866_025_403_784_438_6;
 const ALONG: f64 = 0.5;
 
-/// What is left of a line between arcs belongs to the one behind it where it lasts less than this, s: four cycles of a millisecond.
+/// What is left of a line between arcs belongs to the one behind it where it lasts less than this, s: four
+/// cycles of a millisecond.
 const LEFT_OVER: f64 = 0.004;
 
 /// Corners that turn by less than this, rad, are none.
@@ -113,7 +115,8 @@ impl Arcs {
         divided
     }
 
-    /// The acceleration along a stage between two places of a stretch, mm/s², and the greatest squared speed at its begin.
+    /// The acceleration along a stage between two places of a stretch, mm/s², and the greatest squared speed
+    /// at its begin.
     pub fn limits(&self, whole: f64, [begin, end]: [f64; 2]) -> [f64; 2] {
         let middle = 0.5 * (begin + end);
         if middle < self.lengths[0] {

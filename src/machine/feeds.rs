@@ -1,12 +1,13 @@
-//! Feeds in the program where the machine cannot hold the programmed one: sharp corners, tight bends,
-//! sudden curvature.
+//! Feeds in the program where the machine cannot hold the programmed one: sharp corners, tight bends, sudden
+//! curvature.
 //!
 //! Enters: a path and the machine's limits. Leaves: the same path with lower feeds on some moves, for
 //! controls that look ahead too little and for people who read programs. The speeds are the limits by which
 //! machining time is told ([`super::time`]), rounded up to a series of feeds, so that the words are few and
 //! slow the model down nowhere but at sharp corners. There the last and the first piece of the way, as long
-//! as braking takes, are moves of their own at the corner's speed. Where the tool turns back on its way that speed is zero,
-//! which no word can ask for: none is below [`Machine::creep_feed`], but for feeds that are lower from the start.
+//! as braking takes, are moves of their own at the corner's speed. Where the tool turns back on its way that
+//! speed is zero, which no word can ask for: none is below [`Machine::creep_feed`], but for feeds that are
+//! lower from the start.
 
 use super::Machine;
 use super::time::{Block, profile};
@@ -168,7 +169,8 @@ mod tests {
             let slow = slow_corners(&path, &MACHINE);
             let least = slow.moves.iter().map(|m| m.feed_rate).fold(f64::INFINITY, f64::min);
             assert!(least >= MACHINE.creep_feed() * (1.0 - 1e-9), "{least} in {way:?}");
-            // A zone is as long as braking takes: at its word it lasts no longer than that of the sharpest corner by far.
+            // A zone is as long as braking takes: at its word it lasts no longer than that of the sharpest
+            // corner by far.
             let (before, after) = (seconds(&path, &MACHINE), seconds(&slow, &MACHINE));
             assert!(after < before + 10.0 && after >= before * (1.0 - 1e-9), "{before} {after}");
         }

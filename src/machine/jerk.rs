@@ -1,33 +1,34 @@
 //! Speeds along a path at which every axis keeps its jerk as well.
 //!
-//! Enters: stages with the greatest squared speeds x at their ends, without regard to jerk. Leaves: lower ones. The acceleration
-//! α of an axis in the middle of a stage is linear in x, and from middle to middle it may change by no more than its jerk times
-//! the time between. The time of the path is a convex function of x, and so are the limits but for that time. A barrier method
-//! finds the least: it stays inside of all limits, so that whatever it leaves keeps them, and its Newton steps solve
-//! banded systems. Each section from rest to rest is a problem of its own; at rest no axis accelerates, and in the stages beside
-//! it accelerations rise evenly.
+//! Enters: stages with the greatest squared speeds x at their ends, without regard to jerk. Leaves: lower
+//! ones. The acceleration α of an axis in the middle of a stage is linear in x, and from middle to middle it
+//! may change by no more than its jerk times the time between. The time of the path is a convex function of
+//! x, and so are the limits but for that time. A barrier method finds the least: it stays inside of all
+//! limits, so that whatever it leaves keeps them, and its Newton steps solve banded systems. Each section
+//! from rest to rest is a problem of its own; at rest no axis accelerates, and in the stages beside it
+//! accelerations rise evenly.
 
 use super::axis_limits::{AxisLimits, Stage};
 use work::monitor::{Cancelled, Monitor, check};
 
-// None of these changes what is kept: every step stays inside of all limits. They decide how near to the least time the search ends,
-// and how long it takes.
+// None of these changes what is kept: every step stays inside of all limits. They decide how near to the
+// least time the search ends, and how long it takes.
 
-/// By how much the times found may lie above the least that the barrier can reach, as a share: a tenth of what times are held to.
-/// Each halving takes a round of Newton steps more.
+/// By how much the times found may lie above the least that the barrier can reach, as a share: a tenth of
+/// what times are held to. Each halving takes a round of Newton steps more.
 const GAP: f64 = 2e-3;
 
-/// The same of the convex problem, which only gives the start of the other search: near its end the barrier would crowd the start
-/// against limits that are others there. No time hangs on it: with a third of it, and with three times as much, all are within the same
-/// share of the closed forms.
+/// The same of the convex problem, which only gives the start of the other search: near its end the barrier
+/// would crowd the start against limits that are others there. No time hangs on it: with a third of it, and
+/// with three times as much, all are within the same share of the closed forms.
 const FIRST_GAP: f64 = 0.3;
 
-/// Promises of steps, as a share of what the weight itself keeps away from the least time, that end the search for one weight. More
-/// exact steps are lost on a weight that is left.
+/// Promises of steps, as a share of what the weight itself keeps away from the least time, that end the
+/// search for one weight. More exact steps are lost on a weight that is left.
 const CENTRED: f64 = 0.05;
 
-/// The weight of the barrier over the one before. Smaller ones make fewer rounds of more steps each; the sum hardly changes (S. Boyd
-/// and L. Vandenberghe, "Convex optimization", 2004, 11.3.2).
+/// The weight of the barrier over the one before. Smaller ones make fewer rounds of more steps each; the sum
+/// hardly changes (S. Boyd and L. Vandenberghe, "Convex optimization", 2004, 11.3.2).
 const WEIGHTS: f64 = 0.5;
 
 /// Newton steps for one weight at most: a way out where rounding keeps promises from shrinking.
@@ -91,7 +92,8 @@ struct Section<'a> {
     times: Option<Vec<f64>>,
 }
 
-/// A limit that is kept while `left` is positive: its derivatives by the speeds from the one numbered `first` on.
+/// A limit that is kept while `left` is positive: its derivatives by the speeds from the one numbered `first`
+/// on.
 struct Slack {
     left: f64,
     first: usize,
@@ -106,8 +108,8 @@ struct Barrier {
 }
 
 impl Section<'_> {
-    /// The quickest speeds. With the times between accelerations as they would be without jerk, the shortest, the problem is
-    /// convex; from its solution the search goes on with the times as they are.
+    /// The quickest speeds. With the times between accelerations as they would be without jerk, the shortest,
+    /// the problem is convex; from its solution the search goes on with the times as they are.
     fn quickest(&self, highest: &[f64], monitor: &dyn Monitor) -> Result<Vec<f64>, Cancelled> {
         let times = self.stages.iter().zip(highest.windows(2)).map(|(stage, x)| stage.time([x[0], x[1]]));
         let convex = Self { times: Some(times.collect()), ..*self };
@@ -125,7 +127,8 @@ impl Section<'_> {
         self.slacks(x, |_| limits += 1);
         let mut weight = self.time(x) / limits as f64;
         loop {
-            // What a step promises less than that is a small share of what the weight itself keeps away from the least time.
+            // What a step promises less than that is a small share of what the weight itself keeps away from
+            // the least time.
             let little = CENTRED * weight * limits as f64;
             for _ in 0..MOST_STEPS {
                 check(monitor)?;
@@ -162,7 +165,8 @@ impl Section<'_> {
     fn slacks(&self, x: &[f64], mut take: impl FnMut(&Slack)) {
         let AxisLimits { accelerations, jerks, .. } = self.axes;
         let limited: Vec<usize> = (0..5).filter(|&axis| jerks[axis].is_finite()).collect();
-        // Acceleration in the middle of the stage before, and its derivatives by the speeds at its ends, of each axis.
+        // Acceleration in the middle of the stage before, and its derivatives by the speeds at its ends, of
+        // each axis.
         let mut before = [[0.0; 3]; 5];
         let mut time_before = [0.0; 3];
         for (k, stage) in self.stages.iter().enumerate() {
@@ -186,7 +190,8 @@ impl Section<'_> {
                 Some(times) => [times[k], 0.0, 0.0],
                 None => stage_time(stage, begin, end),
             };
-            // Beside a rest the acceleration at the other end counts, two thirds of the squared speed over the length.
+            // Beside a rest the acceleration at the other end counts, two thirds of the squared speed over
+            // the length.
             let (steep, shares) = match () {
                 () if k == 0 => (4.0 / 3.0 * steep, [0.0, 1.0]),
                 () if k + 1 == self.stages.len() => (4.0 / 3.0 * steep, [1.0, 0.0]),
@@ -323,8 +328,8 @@ fn stage_time(stage: &Stage, begin: f64, end: f64) -> [f64; 3] {
     [time, by(begin), by(end)]
 }
 
-/// That an acceleration which changes by `change` within a time, the sum of two, keeps the jerk. `slope` is that of the change by
-/// the speeds before, at and behind the end numbered `at`.
+/// That an acceleration which changes by `change` within a time, the sum of two, keeps the jerk. `slope` is
+/// that of the change by the speeds before, at and behind the end numbered `at`.
 fn jerk_slacks(
     jerk: f64,
     change: f64,
@@ -345,7 +350,8 @@ fn jerk_slacks(
     }
 }
 
-/// The Newton step of a gradient and a matrix of two diagonals beside the main one, by Cholesky. Both ends stay where they are.
+/// The Newton step of a gradient and a matrix of two diagonals beside the main one, by Cholesky. Both ends
+/// stay where they are.
 fn solved(mut matrix: Vec<[f64; 3]>, gradient: &[f64]) -> Vec<f64> {
     let n = gradient.len();
     let mut way: Vec<f64> = gradient.iter().map(|g| -g).collect();

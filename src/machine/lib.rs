@@ -1,8 +1,8 @@
 //! The machine: speed and acceleration limits, machining time, five-axis kinematics.
 //!
-//! Enters: a path and the limits of a machine. Leaves: the time it takes, reduced feeds at corners, and the joint positions
-//! of five-axis machines ([`kinematics`]). Lengths in mm, rates in mm/min, accelerations in mm/s², times in s, joint angles
-//! in rad.
+//! Enters: a path and the limits of a machine. Leaves: the time it takes, reduced feeds at corners, and the
+//! joint positions of five-axis machines ([`kinematics`]). Lengths in mm, rates in mm/min, accelerations in
+//! mm/s², times in s, joint angles in rad.
 
 mod axis_limits;
 mod blending;
@@ -78,8 +78,9 @@ pub struct MachineError {
 }
 
 impl Machine {
-    /// The feed, mm/min, from which the machine stops within its junction deviation: `√(2·a·δ)`. Programs ask for no less at
-    /// corners, however sharp; what the control still brakes there takes no longer than the corner itself.
+    /// The feed, mm/min, from which the machine stops within its junction deviation: `√(2·a·δ)`. Programs ask
+    /// for no less at corners, however sharp; what the control still brakes there takes no longer than the
+    /// corner itself.
     pub fn creep_feed(&self) -> f64 {
         60.0 * (2.0 * self.acceleration * self.junction_deviation).sqrt()
     }

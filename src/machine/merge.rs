@@ -1,9 +1,10 @@
 //! Lines that are shorter than the control takes are made one.
 //!
-//! Enters: a path, and how far the tool may stray from it. Leaves: the path with moves in a row made one where each alone would last
-//! shorter than the control takes for a line. All tips that are left out lie within the tolerance of the new move, in order along
-//! it. As the distance from a straight move is a convex function, all of the way between them does so as well, and the new move lies
-//! as near to it. Axes that are left out differ no more from one that turns evenly than moves the cutter's upper end by the tolerance.
+//! Enters: a path, and how far the tool may stray from it. Leaves: the path with moves in a row made one
+//! where each alone would last shorter than the control takes for a line. All tips that are left out lie
+//! within the tolerance of the new move, in order along it. As the distance from a straight move is a convex
+//! function, all of the way between them does so as well, and the new move lies as near to it. Axes that are
+//! left out differ no more from one that turns evenly than moves the cutter's upper end by the tolerance.
 
 use super::Machine;
 use super::time::SECONDS_PER_MINUTE;

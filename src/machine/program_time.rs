@@ -1,9 +1,10 @@
 //! How long a machine with rotary axes takes for a program that names all its axes.
 //!
-//! Enters: the joints at the ends of all lines, with the time that the feed asks for. Leaves: the time, by the limits of all axes
-//! ([`super::axis_limits`]). A line is as long as the tip goes in the part, and one in which the tip stands as long as the arcs that
-//! its rotary axes turn by, [`ARM`] away. Between the one kind and the other the machine rests. Other corners are run as [`super::time`]
-//! has it, by the angle between the ways; within a line its axes alone set the speed.
+//! Enters: the joints at the ends of all lines, with the time that the feed asks for. Leaves: the time, by
+//! the limits of all axes ([`super::axis_limits`]). A line is as long as the tip goes in the part, and one in
+//! which the tip stands as long as the arcs that its rotary axes turn by, [`ARM`] away. Between the one kind
+//! and the other the machine rests. Other corners are run as [`super::time`] has it, by the angle between the
+//! ways; within a line its axes alone set the speed.
 
 use super::Machine;
 use super::axis_limits::{AxisLimits, EvenStretch, Run, way};
@@ -12,14 +13,16 @@ use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, slow_sudden_bends};
 use geometry::Vector3;
 use work::monitor::{Cancelled, Monitor};
 
-/// Arm by which a turn about a tip that stands counts as a way, mm. Only corners between such turns hang on it.
+/// Arm by which a turn about a tip that stands counts as a way, mm. Only corners between such turns hang on
+/// it.
 const ARM: f64 = 100.0;
 
-/// A line is divided so that its rotary axes turn by no more than this in a piece, rad: a circle that linear axes follow is run
-/// too fast by less than a ten-thousandth.
+/// A line is divided so that its rotary axes turn by no more than this in a piece, rad: a circle that linear
+/// axes follow is run too fast by less than a ten-thousandth.
 const TURN: f64 = 0.02;
 
-/// Beside a line of several pieces the machine rests at a corner that turns by more than this, rad. It would all but rest there anyway.
+/// Beside a line of several pieces the machine rests at a corner that turns by more than this, rad. It would
+/// all but rest there anyway.
 const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 
 /// Pieces of a line at most.
@@ -28,9 +31,10 @@ const MOST_PIECES: f64 = 4096.0;
 /// Lines that are looked at in one go, from rest to rest: more would take memory and hardly other times.
 const AT_ONCE: usize = 1 << 16;
 
-/// Time, s, for what `program` goes through after its first place, on a machine whose axes keep their rates, accelerations and
-/// jerks. A line takes the time of its feed, or as long as the axes need; a rapid goes as fast as they can and no faster than
-/// the rapid rate. Places that the machine comes to from where nobody knows take none. Infinite where `machine` fails its [`Machine::check`].
+/// Time, s, for what `program` goes through after its first place, on a machine whose axes keep their rates,
+/// accelerations and jerks. A line takes the time of its feed, or as long as the axes need; a rapid goes as
+/// fast as they can and no faster than the rapid rate. Places that the machine comes to from where nobody
+/// knows take none. Infinite where `machine` fails its [`Machine::check`].
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -131,7 +135,8 @@ impl Lines {
         let mut lines = Self::default();
         let rapid = machine.rapid_rate / SECONDS_PER_MINUTE;
         let (mut blocks, mut ending): (Vec<Block>, [f64; 5]) = (Vec::new(), [0.0; 5]);
-        // The first pieces of the blocks, and the lines of the program that each is part of, with their lengths.
+        // The first pieces of the blocks, and the lines of the program that each is part of, with their
+        // lengths.
         let (mut firsts, mut whole): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut of_whole = Vec::new();
         let (mut rests, mut last_pieces, mut tip_moved) = (true, 1, true);
@@ -236,7 +241,8 @@ mod tests {
 
     const ROUND: f64 = 2.0 * std::f64::consts::PI;
 
-    /// 2 s at full rate, and the time to reach it: wherever the tip stands, at rapid and at any feed that asks for less.
+    /// 2 s at full rate, and the time to reach it: wherever the tip stands, at rapid and at any feed that
+    /// asks for less.
     #[test]
     fn a_turn_takes_the_time_of_its_axis() {
         let expected = 2.0 + std::f64::consts::PI / 10.0;
@@ -252,7 +258,8 @@ mod tests {
         assert_relative_eq!(time(&slow, &MACHINE), 20.0, max_relative = 5e-3);
     }
 
-    /// X and Y follow a circle of 200 mm about the table's axis; its time does not hang on how the program divides it.
+    /// X and Y follow a circle of 200 mm about the table's axis; its time does not hang on how the program
+    /// divides it.
     #[test]
     fn linear_axes_follow_a_turn_about_a_kept_tip() {
         let around = |lines: u32| {

@@ -1,31 +1,33 @@
 //! How long a machine takes for a path: trapezoids of velocity with look-ahead over the whole path.
 //!
-//! Every move is run at its feed (rapids at the rapid rate) as far as acceleration allows. At a corner
-//! that turns by β the speed v is the least of
+//! Every move is run at its feed (rapids at the rapid rate) as far as acceleration allows. At a corner that
+//! turns by β the speed v is the least of
 //! - the feeds of both moves;
-//! - v² = a·δ·cos(β/2)/(1 − cos(β/2)): the corner is taken as if rounded by an arc that leaves it
-//!   by the junction deviation δ, with centripetal acceleration a (S. K. Jeon, "Improving grbl: cornering
+//! - v² = a·δ·cos(β/2)/(1 − cos(β/2)): the corner is taken as if rounded by an arc that leaves it by the
+//!   junction deviation δ, with centripetal acceleration a (S. K. Jeon, "Improving grbl: cornering
 //!   algorithm", 2011);
-//! - v² = a·(l/2)·cot(β/2), l the shorter of both moves: the arc must fit between the moves' middles.
-//!   Without this second rule curves of short chords would be as fast as straight lines; with it an arc of
-//!   radius ρ is run at √(a·ρ) whatever its chords (the rule of K. O'Connor's Klipper, "Kinematics");
-//! - v² = ∛(24 δ j²)/|Δκ|: where the curvature changes suddenly by Δκ, the acceleration across the path
-//!   would jump by v²Δκ. With the jerk j it rises over the time v²Δκ/j, and the tool strays from the path by
-//!   a 24th of jump times the square of that time, which must stay within the junction deviation.
-//!   Curvature at a corner is β over half of both moves' lengths.
+//! - v² = a·(l/2)·cot(β/2), l the shorter of both moves: the arc must fit between the moves' middles. Without
+//!   this second rule curves of short chords would be as fast as straight lines; with it an arc of radius ρ
+//!   is run at √(a·ρ) whatever its chords (the rule of K. O'Connor's Klipper, "Kinematics");
+//! - v² = ∛(24 δ j²)/|Δκ|: where the curvature changes suddenly by Δκ, the acceleration across the path would
+//!   jump by v²Δκ. With the jerk j it rises over the time v²Δκ/j, and the tool strays from the path by a 24th
+//!   of jump times the square of that time, which must stay within the junction deviation. Curvature at a
+//!   corner is β over half of both moves' lengths.
 //!
-//! Where the control rounds corners by arcs, a at a corner is a share of the acceleration ([`super::blending`]).
+//! Where the control rounds corners by arcs, a at a corner is a share of the acceleration
+//! ([`super::blending`]).
 //!
-//! A line of the program lasts at least as long as the control takes for it, be it one move or the chords of an arc. No move is fed
-//! faster than at the rapid rate. Where a program dwells or stops the machine comes to rest, and approaches, whose beginning nobody
-//! knows, do not count.
+//! A line of the program lasts at least as long as the control takes for it, be it one move or the chords of
+//! an arc. No move is fed faster than at the rapid rate. Where a program dwells or stops the machine comes to
+//! rest, and approaches, whose beginning nobody knows, do not count.
 //!
-//! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations or jerks
-//! of their own, and those of machines with rotary axes. Rates of X, Y and Z are feeds that no move of an upright tool exceeds.
+//! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has
+//! accelerations or jerks of their own, and those of machines with rotary axes. Rates of X, Y and Z are feeds
+//! that no move of an upright tool exceeds.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
-//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is that of single axes, where they have
-//! limits of it; without, real machines take somewhat longer.
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is that of single
+//! axes, where they have limits of it; without, real machines take somewhat longer.
 
 use std::ops::Range;
 
@@ -38,8 +40,9 @@ use work::monitor::{Cancelled, Monitor};
 
 pub(super) const SECONDS_PER_MINUTE: f64 = 60.0;
 
-/// Moves no longer than this, mm, are what rounding leaves of none: programs are written to a ten-thousandth, so that no
-/// control sees them, and the way before them goes on behind them. A greater length would hide bends.
+/// Moves no longer than this, mm, are what rounding leaves of none: programs are written to a ten-thousandth,
+/// so that no control sees them, and the way before them goes on behind them. A greater length would hide
+/// bends.
 pub(super) const NO_MOVE: f64 = 1e-9;
 
 /// A move with a length, in mm and s.
@@ -79,8 +82,9 @@ impl Block {
     }
 }
 
-/// Time for the whole path, s, dwells aside. Moves of no length, or of no more than a millionth of a micrometre, take none. Infinite when a move has no positive feed
-/// or `machine` fails its [`Machine::check`].
+/// Time for the whole path, s, dwells aside. Moves of no length, or of no more than a millionth of a
+/// micrometre, take none. Infinite when a move has no positive feed or `machine` fails its
+/// [`Machine::check`].
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so, which only limits of jerk make necessary.
@@ -95,8 +99,8 @@ pub fn machining_time(path: &Toolpath, machine: &Machine, monitor: &dyn Monitor)
     Ok(blocks.iter().map(|block| block_time(block, machine.acceleration)).sum())
 }
 
-/// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from rest to rest each
-/// move takes `l/v + v/a` or less. Rapids go at the rapid rate.
+/// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from
+/// rest to rest each move takes `l/v + v/a` or less. Rapids go at the rapid rate.
 pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2]) -> f64 {
     let least = |limits: &[f64; 3], most: f64| limits.iter().copied().fold(most, f64::min);
     let most = least(&machine.accelerations, machine.acceleration);

@@ -1,10 +1,11 @@
 //! How deep a part is cut where it is thin.
 //!
-//! Along the normal of a smooth face a cut is as deep as the place is far from what is left. Where another face is near, the way down along
-//! the normal may be far longer: beneath a sharp ridge it may run along the other side, and through a thin part it comes out there. What
-//! is left of a ridge is sought along the middle between the normals of both faces, too, and the lesser way counts. Between faces that look
-//! apart, and beside the wall below the border of a sheet, a cut is no deeper than half the thickness: what the far side has lost is no loss of
-//! this one. mm.
+//! Along the normal of a smooth face a cut is as deep as the place is far from what is left. Where another
+//! face is near, the way down along the normal may be far longer: beneath a sharp ridge it may run along the
+//! other side, and through a thin part it comes out there. What is left of a ridge is sought along the middle
+//! between the normals of both faces, too, and the lesser way counts. Between faces that look apart, and
+//! beside the wall below the border of a sheet, a cut is no deeper than half the thickness: what the far side
+//! has lost is no loss of this one. mm.
 
 use geometry::{Point3, Vector3};
 use part::{Part, SurfacePoint};
@@ -14,11 +15,13 @@ use crate::figures::NUMERICAL_FLOOR;
 /// Rounds in which the ball shrinks; each leaves a small part of what is too large.
 const SHRINKING: usize = 30;
 
-/// Faces are a sharp ridge, or the sides of something thin, where their unit normals have no greater product: 75 degrees between them. On a blunter
-/// ridge the way along a normal is less than four times as long as what is lost.
+/// Faces are a sharp ridge, or the sides of something thin, where their unit normals have no greater product:
+/// 75 degrees between them. On a blunter ridge the way along a normal is less than four times as long as what
+/// is lost.
 const SHARP: f64 = 0.26;
 
-/// Two faces whose unit normals sum up to less, some eleven degrees between them, have no ridge: they are the sides of a thin part.
+/// Two faces whose unit normals sum up to less, some eleven degrees between them, have no ridge: they are the
+/// sides of a thin part.
 const LEAST_RIDGE: f64 = 0.2;
 
 /// A part that is thinner than a cut is deep.
@@ -36,9 +39,10 @@ impl Thin {
         self.other.is_some_and(|other| normal.dot(&other) > SHARP)
     }
 
-    /// The sums of the unit normals of both faces of a sharp ridge, along their middle; none between the sides of a thin part, at a wall, and
-    /// where the part bends. Of a pointed part with many faces the nearest may be one beside, or one that only bends away: second
-    /// comes the face through which a line along the normal comes out before it is so `deep`, mm.
+    /// The sums of the unit normals of both faces of a sharp ridge, along their middle; none between the
+    /// sides of a thin part, at a wall, and where the part bends. Of a pointed part with many faces the
+    /// nearest may be one beside, or one that only bends away: second comes the face through which a line
+    /// along the normal comes out before it is so `deep`, mm.
     pub fn ridges(
         &self,
         part: &Part,
@@ -58,8 +62,8 @@ pub(crate) fn leads_out(sum: &Vector3) -> bool {
     sum.norm() > LEAST_RIDGE
 }
 
-/// Outward unit normal of the face through which a line from a place of the part comes out before it has run so far along a
-/// unit vector, mm; `None` where it ends in the part. What does not go down has not left.
+/// Outward unit normal of the face through which a line from a place of the part comes out before it has run
+/// so far along a unit vector, mm; `None` where it ends in the part. What does not go down has not left.
 pub(crate) fn face_before(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<Vector3> {
     comes_out(part, place, along, way).map(|face| face.normal)
 }
@@ -70,8 +74,9 @@ fn comes_out(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<S
     (way < 0.0 && distance > NUMERICAL_FLOOR).then_some(face)
 }
 
-/// The sum of the unit normals of a corner: of a ridge with `normals` as that of its faces, one of which is `face`, and of a third face that
-/// bends sharply from both and is nearer than they to the middle of what was cut along their middle, `depth` mm from the place.
+/// The sum of the unit normals of a corner: of a ridge with `normals` as that of its faces, one of which is
+/// `face`, and of a third face that bends sharply from both and is nearer than they to the middle of what was
+/// cut along their middle, `depth` mm from the place.
 pub(crate) fn corner_at(
     part: &Part,
     place: &Point3,
@@ -93,9 +98,9 @@ pub(crate) struct Bounding<'a> {
     pub walls: bool,
 }
 
-/// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the thickness
-/// there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using nearest neighbors and
-/// the normal field", 2012).
+/// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the
+/// thickness there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using
+/// nearest neighbors and the normal field", 2012).
 pub(crate) fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
     let all = Bounding { counts: &|_| true, walls: false };
     thinner(part, point, normal, most, all).map_or(most, |thin| thin.radius)
@@ -140,8 +145,8 @@ mod tests {
     use cutter::Cutter;
     use geometry::{Aabb, TriangleMesh};
 
-    /// A flat end that runs level over the tip of a cone with twelve faces: lines along their normals run out through the faces opposite,
-    /// while the nearest face beside bends away by thirty degrees alone.
+    /// A flat end that runs level over the tip of a cone with twelve faces: lines along their normals run out
+    /// through the faces opposite, while the nearest face beside bends away by thirty degrees alone.
     #[test]
     fn a_cut_over_the_tip_of_a_cone_is_as_deep_as_the_tip_is_lower() {
         const FACES: usize = 12;
@@ -181,8 +186,8 @@ mod tests {
         assert!((at(20.0, 0.5) - 0.5).abs() < 1e-4);
     }
 
-    /// A ball that cuts one face of a ridge by a micrometre: the way down along the normal of the other face runs along what
-    /// was cut, far longer than it is deep.
+    /// A ball that cuts one face of a ridge by a micrometre: the way down along the normal of the other face
+    /// runs along what was cut, far longer than it is deep.
     #[test]
     fn a_cut_along_a_sharp_ridge_is_as_deep_as_the_crest_is_lower() {
         let corners = [

@@ -1,10 +1,13 @@
-//! How deep a cut beside a border counts, for upright cutters: by one rule at the border itself and at all places near it. mm.
+//! How deep a cut beside a border counts, for upright cutters: by one rule at the border itself and at all
+//! places near it. mm.
 //!
-//! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it, it goes on down the wall:
-//! what lies beyond belongs to no part. Where the side of a cutter reaches over a border by less than most of the gouge tolerance, what is
-//! left is as near, and the cut counts no deeper than that.
+//! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it,
+//! it goes on down the wall: what lies beyond belongs to no part. Where the side of a cutter reaches over a
+//! border by less than most of the gouge tolerance, what is left is as near, and the cut counts no deeper
+//! than that.
 //!
-//! Enters: the part, a place of it, and the cut along its normal there. Leaves: how deep that counts, and at most around the place.
+//! Enters: the part, a place of it, and the cut along its normal there. Leaves: how deep that counts, and at
+//! most around the place.
 
 use super::border_cuts::{BorderPiece, INSIDE_SHARE, least_way, pieces};
 use super::closer::Value;
@@ -59,8 +62,9 @@ impl Borders {
 }
 
 impl Inspection<'_> {
-    /// How deep a cut counts at a place that lies beside a border, and at most as far as `aside` mm around; `None` where it is as deep as it is
-    /// along the normal. `further` are moves that may be lowest between centres.
+    /// How deep a cut counts at a place that lies beside a border, and at most as far as `aside` mm around;
+    /// `None` where it is as deep as it is along the normal. `further` are moves that may be lowest between
+    /// centres.
     pub fn beside_border(
         &self,
         p: &Point3,
@@ -86,13 +90,15 @@ impl Inspection<'_> {
         left.chain(wall).reduce(least).filter(|counted| counted.here < depth)
     }
 
-    /// How deep a cut of a move counts at a place, as deep as it is along the normal there, where the way down leads out through a border.
+    /// How deep a cut of a move counts at a place, as deep as it is along the normal there, where the way
+    /// down leads out through a border.
     pub fn counted(&self, p: &Point3, normal: &Vector3, depth: f64, by: u32) -> Option<f64> {
         let pieces = self.borders?.near(p, &(p - normal * depth), NUMERICAL_FLOOR);
         self.down_wall(&pieces, p, normal, depth, &[by])
     }
 
-    /// How far what a move leaves is from a place beside a piece, where that is near, and at most as far as `aside` mm around.
+    /// How far what a move leaves is from a place beside a piece, where that is near, and at most as far as
+    /// `aside` mm around.
     fn near_left(&self, piece: &BorderPiece, p: &Point3, by: u32, aside: f64) -> Option<Value> {
         if by == NOT_CUT {
             return None;
@@ -116,7 +122,8 @@ impl Inspection<'_> {
                 let left = |far: f64| is_left(share, far) == Some(true);
                 (foot + piece.inward_by(share, least_way(far, left)) - p).norm()
             }
-            // As little as the border itself counts where a move does not pass beside it, as beside a vertical flank.
+            // As little as the border itself counts where a move does not pass beside it, as beside a
+            // vertical flank.
             None => 0.0,
         };
         let along = aside / (b - a).norm();
@@ -125,8 +132,9 @@ impl Inspection<'_> {
         Some(Value { here, possible: if holds { here + aside } else { f64::INFINITY } })
     }
 
-    /// The way down from a place along its normal, as deep as a cut is along it, where it leads out through one of some pieces: to the wall
-    /// there and on down along that, as far as it is cut, by some moves if by none that cells know.
+    /// The way down from a place along its normal, as deep as a cut is along it, where it leads out through
+    /// one of some pieces: to the wall there and on down along that, as far as it is cut, by some moves if by
+    /// none that cells know.
     fn down_wall(
         &self,
         pieces: &[&BorderPiece],
@@ -173,8 +181,9 @@ mod tests {
 
     const CELLS: [f64; 5] = [0.005, 0.01, 0.03, 0.1, 0.4];
 
-    /// A ball beside a border that the part rises to a little: the way along the normal leads out through the border, and is longer than that
-    /// down the wall. Cells whose places come as near to the border as they like tell the same.
+    /// A ball beside a border that the part rises to a little: the way along the normal leads out through the
+    /// border, and is longer than that down the wall. Cells whose places come as near to the border as they
+    /// like tell the same.
     #[test]
     fn a_cut_beside_a_border_counts_as_deep_as_down_the_wall_on_cells_of_every_size() {
         let (slope, beside, deep) = (0.05, 1.2, 0.0019);
@@ -197,7 +206,8 @@ mod tests {
         }
     }
 
-    /// The side of a flat end mill reaches over a border by less than the tolerance: nothing, on cells whose places lie on the border, too.
+    /// The side of a flat end mill reaches over a border by less than the tolerance: nothing, on cells whose
+    /// places lie on the border, too.
     #[test]
     fn a_vertical_side_over_a_border_counts_nothing_on_cells_of_every_size() {
         let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
@@ -208,8 +218,8 @@ mod tests {
         }
     }
 
-    /// The steep flank of a ball reaches over a border by less than the tolerance, deeper than that: what is left is as near. On fine
-    /// cells as on coarse ones, and at a place on a corner.
+    /// The steep flank of a ball reaches over a border by less than the tolerance, deeper than that: what is
+    /// left is as near. On fine cells as on coarse ones, and at a place on a corner.
     #[test]
     fn a_flank_over_a_border_counts_as_deep_as_what_is_left_is_near_on_cells_of_every_size() {
         let (part, ball) = (plane([0.4, 0.3]), Cutter::ball(6.0).unwrap());

@@ -1,15 +1,17 @@
-//! The deepest cut along the borders of what an upright cutter can face: a cutter that stands beside the part may cut its
-//! border between the centres of all cells. mm.
+//! The deepest cut along the borders of what an upright cutter can face: a cutter that stands beside the part
+//! may cut its border between the centres of all cells. mm.
 //!
-//! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n (or any one direction) is a
-//! concave function of the place: what the move sweeps is convex. So three places bound it between them, and halving finds its greatest.
+//! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n (or any
+//! one direction) is a concave function of the place: what the move sweeps is convex. So three places bound
+//! it between them, and halving finds its greatest.
 //!
-//! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it, the depth is no more
-//! than that along the wall: what lies beyond belongs to no part. The lesser of two concave depths is concave, too.
+//! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it,
+//! the depth is no more than that along the wall: what lies beyond belongs to no part. The lesser of two
+//! concave depths is concave, too.
 //!
-//! Limits: where the side of the cutter reaches over the border by less than the gouge tolerance, what is left of the part is nearer than
-//! that, however long the way along the normal is beside a steep flank. Such a place counts as deep as that is near: as far as the
-//! way inward along the design is to where it is left.
+//! Limits: where the side of the cutter reaches over the border by less than the gouge tolerance, what is
+//! left of the part is nearer than that, however long the way along the normal is beside a steep flank. Such
+//! a place counts as deep as that is near: as far as the way inward along the design is to where it is left.
 
 use std::collections::HashMap;
 
@@ -26,7 +28,8 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Pieces of borders are no longer than this many radii of the narrowest cutter.
 const LONGEST_PIECE: f64 = 2.0;
 
-/// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
+/// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it
+/// is √2 times as far off.
 pub(super) const INSIDE_SHARE: f64 = 0.65;
 
 /// Halvings by which the way to what is left is found: to a ten-millionth of the farthest.
@@ -70,7 +73,8 @@ struct PlaceDepth {
     inside: f64,
 }
 
-/// The design at a share of the side of a triangle, whose ends have parameters on a patch, and the normal there.
+/// The design at a share of the side of a triangle, whose ends have parameters on a patch, and the normal
+/// there.
 pub(super) fn design_along(
     part: &Part,
     ends: &[Point3; 2],
@@ -97,7 +101,8 @@ impl BorderPiece {
         normal.dot(&across) * across.dot(&self.inward) > 0.0
     }
 
-    /// As far from the end of the piece, where another border may begin, as from the border: as a share of it.
+    /// As far from the end of the piece, where another border may begin, as from the border: as a share of
+    /// it.
     fn end(&self, far: f64) -> f64 {
         (far / (self.ends[1] - self.ends[0]).norm()).min(0.5)
     }
@@ -194,8 +199,8 @@ impl Nearby {
     }
 }
 
-/// How deep a move cuts at a place along a direction, negative above it; infinite where it goes along the cutter's flank, and
-/// `None` where the move does not pass.
+/// How deep a move cuts at a place along a direction, negative above it; infinite where it goes along the
+/// cutter's flank, and `None` where the move does not pass.
 fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) -> Option<f64> {
     let mut t = 0.0;
     for _ in 0..STEPS {
@@ -214,7 +219,8 @@ fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) ->
     Some(t)
 }
 
-/// The share of a piece at which it comes nearest to a stretch of the plan: by turns, which converges on straight lines.
+/// The share of a piece at which it comes nearest to a stretch of the plan: by turns, which converges on
+/// straight lines.
 fn nearest_share(piece: &BorderPiece, from: Point2, to: Point2) -> f64 {
     const TURNS: usize = 20;
     let [a, b] = piece.ends.map(|end| end.xy());
@@ -271,7 +277,8 @@ impl Inspection<'_> {
         Ok(())
     }
 
-    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
+    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a
+    /// share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
         let design = |share: f64| piece.design(self.part, share);
         let length = (piece.ends[1] - piece.ends[0]).norm();
@@ -302,7 +309,8 @@ impl Inspection<'_> {
             self.on_ridge(&(place + piece.inward * NUMERICAL_FLOOR), &normal, along)
         };
         let least = self.limits.shallow();
-        // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
+        // What a border bends by between two places spoils concavity by as much; it falls with the square of
+        // their distance.
         let bend = 3.0 * piece.bend;
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
@@ -429,7 +437,8 @@ mod tests {
         gouge_of(&plane([8.0, 6.0]), cutter, &passes, cell)
     }
 
-    /// A ball plunges beside the part: the border is cut by what its sphere reaches over it, on cells of every size.
+    /// A ball plunges beside the part: the border is cut by what its sphere reaches over it, on cells of
+    /// every size.
     #[test]
     fn what_a_cutter_beside_the_part_cuts_of_its_border_is_found() {
         let ball = Cutter::ball(6.0).unwrap();
@@ -453,9 +462,10 @@ mod tests {
         }
     }
 
-    /// A ball beside a border that the part rises to: the normal leads out over the border, nearly along the ball's flank, and
-    /// would find a depth many times that of the cut. It is no more than that along the border's wall; and where the ball reaches
-    /// over the border by less than the tolerance, no more than the way along the design to where it is left.
+    /// A ball beside a border that the part rises to: the normal leads out over the border, nearly along the
+    /// ball's flank, and would find a depth many times that of the cut. It is no more than that along the
+    /// border's wall; and where the ball reaches over the border by less than the tolerance, no more than the
+    /// way along the design to where it is left.
     #[test]
     fn depths_do_not_lead_out_over_a_border() {
         let rising = TriangleMesh::new(
@@ -484,7 +494,8 @@ mod tests {
         assert!((found.max_depth_mm - deep).abs() < 1e-6, "{found:?}");
     }
 
-    /// A ball that plunges beyond a corner of a bowl: it is cut deepest in the corner itself, from which the ground falls both ways.
+    /// A ball that plunges beyond a corner of a bowl: it is cut deepest in the corner itself, from which the
+    /// ground falls both ways.
     #[test]
     fn what_is_cut_of_the_corner_of_a_bowl_is_found() {
         let shape = AnalyticShape::Sphere { height: 0.0, radius: 20.616, concave: true };
@@ -508,7 +519,8 @@ mod tests {
         }
     }
 
-    /// A level patch whose border is an arc in the plan. The triangles end at its chords; a ball that plunges beyond cuts the arc.
+    /// A level patch whose border is an arc in the plan. The triangles end at its chords; a ball that plunges
+    /// beyond cuts the arc.
     #[test]
     fn the_border_of_a_patch_is_its_curve() {
         let rows = [[[0.0, 0.0], [4.0, 0.0], [8.0, 0.0]], [[0.0, 4.0], [2.6, 8.6], [8.0, 4.4]]];
@@ -530,8 +542,8 @@ mod tests {
         }
     }
 
-    /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it stands. By more it is
-    /// one.
+    /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it
+    /// stands. By more it is one.
     #[test]
     fn the_side_of_a_cutter_is_no_gouge_as_far_as_the_tolerance_lets_it() {
         let flat = Cutter::flat(6.0).unwrap();
@@ -543,8 +555,8 @@ mod tests {
         assert!(corner.max_depth_mm < 1e-6, "{corner:?}");
     }
 
-    /// A ball comes half a micrometre too near to the corner of a slope, its flank along the normal: what is left is as near. Forty times
-    /// nearer it is a gouge.
+    /// A ball comes half a micrometre too near to the corner of a slope, its flank along the normal: what is
+    /// left is as near. Forty times nearer it is a gouge.
     #[test]
     fn a_steep_flank_at_a_corner_is_as_deep_as_what_is_left_is_near() {
         let slope = TriangleMesh::new(

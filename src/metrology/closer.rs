@@ -116,8 +116,8 @@ pub(super) struct Effort {
     pub places: usize,
     /// Squares that are held at a time, [`BYTES_PER_SQUARE`] each.
     pub squares: usize,
-    /// The search ends where it can bring the bound neither to this, mm, nor to what was asked: nothing is decided by a higher one. Infinite
-    /// where each bound is of use.
+    /// The search ends where it can bring the bound neither to this, mm, nor to what was asked: nothing is
+    /// decided by a higher one. Infinite where each bound is of use.
     pub useful: f64,
 }
 
@@ -127,8 +127,8 @@ impl Effort {
         Self { places, squares, useful: f64::INFINITY }
     }
 
-    /// Whether no bound below `least`, mm, comes of the places that are left after `spent` ones: each square that promises more has to be
-    /// divided once at least.
+    /// Whether no bound below `least`, mm, comes of the places that are left after `spent` ones: each square
+    /// that promises more has to be divided once at least.
     fn is_in_vain(&self, open: &BinaryHeap<Square>, least: f64, spent: usize) -> bool {
         let promising = || open.iter().filter(|square| square.possible > least).count();
         self.useful.is_finite() && 4 * promising() > self.places - spent
@@ -164,8 +164,9 @@ impl PartialOrd for Square {
     }
 }
 
-/// Searches `squares`, all of one size, for values above `known`, holding no more than `held` at a time. `at` tells what the square around a
-/// place with a given half side holds, and at which of its places; `None` off the part.
+/// Searches `squares`, all of one size, for values above `known`, holding no more than `held` at a time. `at`
+/// tells what the square around a place with a given half side holds, and at which of its places; `None` off
+/// the part.
 ///
 /// # Tolerance
 /// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
@@ -196,9 +197,10 @@ pub(super) fn greatest(
     search(squares, known, &|_| asked, Effort::whole(MOST, held), &inside, &|_, _| true, monitor)
 }
 
-/// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside` tells what the square around a
-/// centre with a given half side holds, and at which of its places; `None` where it holds nothing. A value that would be the greatest counts
-/// only where `stands` says so; what it says may change `inside` for squares that are looked at later.
+/// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside`
+/// tells what the square around a centre with a given half side holds, and at which of its places; `None`
+/// where it holds nothing. A value that would be the greatest counts only where `stands` says so; what it
+/// says may change `inside` for squares that are looked at later.
 pub(super) fn search(
     squares: Vec<Square>,
     known: f64,
@@ -308,8 +310,8 @@ mod tests {
         assert_eq!(found, BoundedGreatest { greatest: None, possible: 5.0 });
     }
 
-    /// A plateau whose squares promise more than it is high however small they are. The search cannot close its bound, and ends early where
-    /// so high a bound is of no use. A crest is told as ever.
+    /// A plateau whose squares promise more than it is high however small they are. The search cannot close
+    /// its bound, and ends early where so high a bound is of no use. A crest is told as ever.
     #[test]
     fn a_search_in_vain_ends_where_its_bound_is_of_no_use() {
         use std::sync::atomic::{AtomicUsize, Ordering};

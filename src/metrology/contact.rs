@@ -6,10 +6,12 @@ use motion::{ClPoint, Toolpath};
 use part::{Part, PatchPoint, SurfacePoint};
 use std::f64::consts::TAU;
 
-/// Rounds at most in which the place where a tilted cutter touches is found: each takes the normal of the one before.
+/// Rounds at most in which the place where a tilted cutter touches is found: each takes the normal of the one
+/// before.
 const CONTACT_ROUNDS: usize = 40;
 
-/// A contact that is off by less than this share of the cutter's radius touches; else others around the cutter are looked for.
+/// A contact that is off by less than this share of the cutter's radius touches; else others around the
+/// cutter are looked for.
 const TOUCHING: f64 = 0.01;
 
 /// Places around the cutter from which they are.
@@ -21,11 +23,12 @@ const PARALLEL: f64 = 1e-6;
 /// A round that moves the contact by less, mm, is the last.
 const CLOSE: f64 = 1e-7;
 
-/// The place of the part that a cutter touches, or comes nearest to, how far it is off, and where on the cutter that is.
+/// The place of the part that a cutter touches, or comes nearest to, how far it is off, and where on the
+/// cutter that is.
 ///
-/// Rounds close in by the ratio of the curvatures of part and cutter, slowly where a bull nose end mill nearly fills a hollow.
-/// There the changes of the last two rounds tell where they lead to (D. G. Anderson, "Iterative procedures for nonlinear
-/// integral equations", 1965).
+/// Rounds close in by the ratio of the curvatures of part and cutter, slowly where a bull nose end mill
+/// nearly fills a hollow. There the changes of the last two rounds tell where they lead to (D. G. Anderson,
+/// "Iterative procedures for nonlinear integral equations", 1965).
 pub(super) fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> (SurfacePoint, f64, Point3) {
     let profile = cutter.profile();
     let middle = at.tip + at.axis * profile.centre_z;
@@ -104,8 +107,8 @@ impl Round {
     }
 }
 
-/// Where on the part's patches the cutter touches at the end of each move that runs on the surface. `None` for other moves, and
-/// on meshes.
+/// Where on the part's patches the cutter touches at the end of each move that runs on the surface. `None`
+/// for other moves, and on meshes.
 pub fn contacts_on_patches(part: &Part, cutter: &Cutter, path: &Toolpath) -> Vec<Option<PatchPoint>> {
     if part.patches().is_empty() {
         return vec![None; path.len()];
@@ -123,8 +126,8 @@ mod tests {
     use motion::{CcPoint, location};
     use part::Patch;
 
-    /// In a bowl of 20 mm a bull nose whose flat has a radius of 2 mm touches all around at a lean of asin(2/19), 6.04 degrees.
-    /// Little more leaves one contact, which rounds close in on by 0.96 each.
+    /// In a bowl of 20 mm a bull nose whose flat has a radius of 2 mm touches all around at a lean of
+    /// asin(2/19), 6.04 degrees. Little more leaves one contact, which rounds close in on by 0.96 each.
     #[test]
     fn a_bull_nose_that_nearly_fills_a_bowl_touches_where_it_was_put() {
         let shape = AnalyticShape::Sphere { height: 0.0, radius: 20.0, concave: true };

@@ -1,5 +1,5 @@
-//! Creases of the part: where two of its faces meet, each may be cut deepest along the crease itself, and the centres of the cells around
-//! may all lie on the other face. mm.
+//! Creases of the part: where two of its faces meet, each may be cut deepest along the crease itself, and the
+//! centres of the cells around may all lie on the other face. mm.
 //!
 //! Enters: the part. Leaves: the stretches of creases in squares of the plan, with the normals of both faces.
 
@@ -9,7 +9,8 @@ use geometry::{CurveSegment, Point2, Point3, SegmentGrid, TriangleMesh, Vector2,
 use part::{Part, PatchPoint};
 use sim::Grid;
 
-/// Faces meet at a crease where the cosine between their normals is less: 5 degrees. At flatter ones both are cut about as deep.
+/// Faces meet at a crease where the cosine between their normals is less: 5 degrees. At flatter ones both are
+/// cut about as deep.
 const CREASED: f64 = 0.9962;
 
 /// So far within a triangle, as a share of it, its side is on its own face and not on the other one.
@@ -61,7 +62,8 @@ impl Creases {
         found
     }
 
-    /// The middles of the stretches of creases in a square of the plan, also on its sides, each with the normal of one of its faces.
+    /// The middles of the stretches of creases in a square of the plan, also on its sides, each with the
+    /// normal of one of its faces.
     pub fn within(&self, part: &Part, centre: Point2, half: f64) -> Vec<(Point3, Vector3)> {
         let half = half + ON_SIDE;
         let corner = |reach: f64| Point2::new(centre.x + reach, centre.y + reach);
@@ -109,7 +111,8 @@ fn side_of(part: &Part, t: usize, k: usize) -> Option<Side> {
     Some(own)
 }
 
-/// The side `k` of triangle `t`; on a patch a little within the triangle, whose normals are those of its own face.
+/// The side `k` of triangle `t`; on a patch a little within the triangle, whose normals are those of its own
+/// face.
 fn on_side(part: &Part, t: usize, k: usize) -> Side {
     let [a, b, c] = [0, 1, 2].map(|n| (k + n) % 3);
     let (corners, at) = (part.mesh().corners(t), part.corner_parameters(t));
@@ -141,8 +144,8 @@ fn cells_along(side: &Side, grid: &Grid) -> Vec<usize> {
     within.map(|(i, j)| grid.index(i, j)).collect()
 }
 
-/// The squares of side 1 that a line runs through, by the whole numbers at their lower corners: all from 0 to what is `most` along both,
-/// and some others.
+/// The squares of side 1 that a line runs through, by the whole numbers at their lower corners: all from 0 to
+/// what is `most` along both, and some others.
 fn squares_along([a, b]: [Vector2; 2], most: [f64; 2]) -> Vec<[i64; 2]> {
     let mut cuts = vec![0.0, 1.0];
     for (c, most) in most.into_iter().enumerate() {
@@ -217,8 +220,8 @@ mod tests {
         assert!(all.iter().all(|[_, most]| deepest <= *most), "{all:?}");
     }
 
-    /// Faces that meet at a fifteenth of a degree, and a flat end that runs level over their crest: the cut is deepest there, and falls
-    /// off evenly on both sides.
+    /// Faces that meet at a fifteenth of a degree, and a flat end that runs level over their crest: the cut
+    /// is deepest there, and falls off evenly on both sides.
     #[test]
     fn a_flat_crest_is_cut_as_deep_on_cells_of_every_size() {
         let (slope, deep) = (6e-4, 4e-4);

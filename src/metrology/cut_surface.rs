@@ -59,8 +59,8 @@ pub struct CutSurface<'a> {
     standing: OnceLock<Vec<f64>>,
 }
 
-/// Cells along the side of such a block: a line along a normal leaves what stands there in one step. In larger ones some cell is cut
-/// deeper more often.
+/// Cells along the side of such a block: a line along a normal leaves what stands there in one step. In
+/// larger ones some cell is cut deeper more often.
 const BLOCK: usize = 16;
 
 /// Most steps along the program in search of a lower move. Reached only where moves are some
@@ -210,7 +210,8 @@ impl<'a> CutSurface<'a> {
     }
 }
 
-/// How low the tip comes on each move of a path and on some of its pass before and after it, which a place may be followed to, mm.
+/// How low the tip comes on each move of a path and on some of its pass before and after it, which a place
+/// may be followed to, mm.
 fn lowest_tips(path: &Toolpath) -> Vec<f64> {
     /// Moves before and after.
     const FOLLOWED: usize = 8;
@@ -254,12 +255,12 @@ impl CutSurface<'_> {
         self.envelope.lowest(at.x, at.y, moves).map_or(f64::INFINITY, |(z, _)| z)
     }
 
-    /// Signed distance from the design point `p` with outward unit normal `n` to the cut surface
-    /// along `n`. `None` off the grid.
+    /// Signed distance from the design point `p` with outward unit normal `n` to the cut surface along `n`.
+    /// `None` off the grid.
     ///
     /// # Tolerance
-    /// The meeting lies on the closed-form surface to `MEETING`: beside the grid that of what cut its outermost cells. Where the line
-    /// meets none of it, the vertical distance times `n.z` stands in for it.
+    /// The meeting lies on the closed-form surface to `MEETING`: beside the grid that of what cut its
+    /// outermost cells. Where the line meets none of it, the vertical distance times `n.z` stands in for it.
     pub fn along_normal(&self, p: &Point3, n: &Vector3) -> Option<Deviation> {
         self.along_normal_with(p, n, &[])
     }
@@ -269,8 +270,8 @@ impl CutSurface<'_> {
         self.along_normal_below(f64::INFINITY, p, n, further)
     }
 
-    /// As [`CutSurface::along_normal_with`], where stock stands up to a height, mm, wherever none of these moves passes: for places where
-    /// no other does. Without it the line meets nothing there.
+    /// As [`CutSurface::along_normal_with`], where stock stands up to a height, mm, wherever none of these
+    /// moves passes: for places where no other does. Without it the line meets nothing there.
     pub fn along_normal_below(
         &self,
         stock: f64,
@@ -317,8 +318,8 @@ impl CutSurface<'_> {
         }))
     }
 
-    /// Whether what cut a cell and those around it, with the moves that follow on, left all that stood at a place there: no tool cuts below
-    /// its tip.
+    /// Whether what cut a cell and those around it, with the moves that follow on, left all that stood at a
+    /// place there: no tool cuts below its tip.
     fn stands(&self, q: &Point3, (i, j): (usize, usize)) -> bool {
         let Grid { nx, ny, .. } = self.cut.grid;
         let is_in_stock = |k: usize| match &self.cut.shape {
@@ -336,8 +337,8 @@ impl CutSurface<'_> {
         rows.all(|j| columns.clone().all(|i| is_left(self.cut.grid.index(i, j))))
     }
 
-    /// How many steps of a line from a place along its normal surely lead to places that [`Self::stands`], where no other move comes
-    /// lower than `lowest`, mm.
+    /// How many steps of a line from a place along its normal surely lead to places that [`Self::stands`],
+    /// where no other move comes lower than `lowest`, mm.
     fn standing_steps(&self, from: &Point3, n: &Vector3, step: f64, lowest: f64) -> usize {
         let grid = &self.cut.grid;
         let Some((i, j)) = grid.cell_at(from.x, from.y) else { return 0 };
@@ -364,7 +365,8 @@ impl CutSurface<'_> {
         ((way / step) as usize).saturating_sub(1).min(MOST_MARCHING_STEPS)
     }
 
-    /// Of each block of cells, row by row, how high all that stood surely stands in each of its cells, and those around them, mm.
+    /// Of each block of cells, row by row, how high all that stood surely stands in each of its cells, and
+    /// those around them, mm.
     fn standing_blocks(&self) -> Vec<f64> {
         let (grid, cut) = (&self.cut.grid, self.cut);
         let level = |k: usize| match cut.cut_by[k] {
@@ -392,9 +394,9 @@ impl CutSurface<'_> {
         }
     }
 
-    /// Follows the normal in steps of half a cell to the first change of side; the bracket
-    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` by the tips of the tools around,
-    /// and many steps are taken at once where that is known of all of them.
+    /// Follows the normal in steps of half a cell to the first change of side; the bracket `(lower, upper)`
+    /// of the meeting. Upward it is not asked how high the cut is where so much `stands` by the tips of the
+    /// tools around, and many steps are taken at once where that is known of all of them.
     fn march(
         &self,
         p: &Point3,
@@ -513,7 +515,8 @@ mod tests {
         }
     }
 
-    /// A ball of 6 mm along y = 10 and y = 11.5, the second unseen by cells; lines in the plane of a section meet circles.
+    /// A ball of 6 mm along y = 10 and y = 11.5, the second unseen by cells; lines in the plane of a section
+    /// meet circles.
     #[test]
     fn a_line_that_leaves_the_grid_meets_what_cut_its_border_and_moves_that_no_cell_saw() {
         let cutter = Cutter::ball(6.0).unwrap();
@@ -536,7 +539,8 @@ mod tests {
         }
     }
 
-    /// Steps that are taken at once lead to places where all that stood is left, and there are many of them in a block that nothing cut.
+    /// Steps that are taken at once lead to places where all that stood is left, and there are many of them
+    /// in a block that nothing cut.
     #[test]
     fn steps_taken_at_once_lead_through_what_stands() {
         let cutter = Cutter::flat(4.0).unwrap();

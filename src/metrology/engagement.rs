@@ -1,22 +1,23 @@
 //! How much of the cutter's circumference stands in stock along a path, in the plan view.
 //!
-//! Enters: path, cutter, stock with a flat top. Leaves: for every move the greatest angle of the front half of the circumference
-//! in stock, and what it is at most anywhere on the move. Corners of bull cutters and balls count as cylinders of the same
-//! radius; mm, rad. Nothing here knows how a path was planned.
+//! Enters: path, cutter, stock with a flat top. Leaves: for every move the greatest angle of the front half
+//! of the circumference in stock, and what it is at most anywhere on the move. Corners of bull cutters and
+//! balls count as cylinders of the same radius; mm, rad. Nothing here knows how a path was planned.
 //!
-//! What the path has cleared is the union of what its segments swept, each a stadium of the cutter's radius. A circle meets a
-//! stadium along arcs in closed form, so the angle at a place is exact. Where a layer beyond the circumference is thinner than
-//! a film, whose thickness the caller chooses, it does not count as stock: chords and rounding leave films along ground that was cut
-//! before, which load nothing. Only the chip that is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is,
-//! as far back as it would hide the sides of a straight slot.
+//! What the path has cleared is the union of what its segments swept, each a stadium of the cutter's radius.
+//! A circle meets a stadium along arcs in closed form, so the angle at a place is exact. Where a layer beyond
+//! the circumference is thinner than a film, whose thickness the caller chooses, it does not count as stock:
+//! chords and rounding leave films along ground that was cut before, which load nothing. Only the chip that
+//! is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is, as
+//! far back as it would hide the sides of a straight slot.
 //!
-//! A stadium is convex. So what lies in it as seen from both ends of a stretch lies in it as seen from everywhere between, and
-//! the same calculation from both ends bounds the angle on the whole stretch. What it loses are places that one segment clears
-//! at one end and the next segment at the other: a layer whose depth is of second order. Stretches are halved until the bound
-//! is near the greatest angle that was found.
+//! A stadium is convex. So what lies in it as seen from both ends of a stretch lies in it as seen from
+//! everywhere between, and the same calculation from both ends bounds the angle on the whole stretch. What it
+//! loses are places that one segment clears at one end and the next segment at the other: a layer whose depth
+//! is of second order. Stretches are halved until the bound is near the greatest angle that was found.
 //!
-//! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in what else was is left
-//! out from then on: loops and passes over cleared ground are most of a long path.
+//! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in
+//! what else was is left out from then on: loops and passes over cleared ground are most of a long path.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
@@ -27,23 +28,24 @@ use motion::{Move, MoveKind, Toolpath};
 use sim::{ENGAGED, Stock};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Films up to this share of the radius are no stock for an engagement that is judged. Beside a straight wall an angle `a` is seen
-/// smaller by about as much over `sin a`.
+/// Films up to this share of the radius are no stock for an engagement that is judged. Beside a straight wall
+/// an angle `a` is seen smaller by about as much over `sin a`.
 pub const UNCOUNTED_LAYER: f64 = 0.005;
 
-/// Thinner layers, over the radius, are no chips in any case: an edge needs about a third of its own radius to cut, and edges are
-/// rounded by one to three thousandths of the cutter's radius.
+/// Thinner layers, over the radius, are no chips in any case: an edge needs about a third of its own radius
+/// to cut, and edges are rounded by one to three thousandths of the cutter's radius.
 pub const THIN_LAYER: f64 = 0.001;
 
-/// Stretches of a move that are looked at are no longer than this share of the radius, and may be halved so often.
+/// Stretches of a move that are looked at are no longer than this share of the radius, and may be halved so
+/// often.
 const STRETCH: f64 = 0.05;
 const HALVINGS: u32 = 12;
 
 /// A bound that exceeds the greatest angle by no more is good enough, rad.
 const PRECISE: f64 = 0.02 * PI / 180.0;
 
-/// Parts of the half circle: a segment that is near to none in which anything stands clears nothing. Longer parts let pass more
-/// segments, shorter ones are more to ask for.
+/// Parts of the half circle: a segment that is near to none in which anything stands clears nothing. Longer
+/// parts let pass more segments, shorter ones are more to ask for.
 const PARTS: usize = 24;
 const PART: f64 = PI / PARTS as f64;
 
@@ -79,8 +81,9 @@ impl ContactArcs {
     }
 }
 
-/// The angles along `path` in a stock whose top is flat, but for what was [cleared](Stock::cleared) before. Those of the moves
-/// that `count` are bounded. Layers up to the share `film` of the radius beside ground that was cleared before are no stock.
+/// The angles along `path` in a stock whose top is flat, but for what was [cleared](Stock::cleared) before.
+/// Those of the moves that `count` are bounded. Layers up to the share `film` of the radius beside ground
+/// that was cleared before are no stock.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -265,7 +268,8 @@ impl<'a> Swept<'a> {
         swept
     }
 
-    /// The buckets of places along a segment, a bucket apart at most; who looks for it looks a bucket farther.
+    /// The buckets of places along a segment, a bucket apart at most; who looks for it looks a bucket
+    /// farther.
     fn buckets_of(&self, [a, b]: [Point2; 2]) -> Vec<usize> {
         let steps = ((b - a).norm() / self.bucket).ceil().max(1.0);
         let of = |step: usize| {
@@ -277,8 +281,9 @@ impl<'a> Swept<'a> {
         all
     }
 
-    /// Leaves out segments that lie whole in others: those of both that no place of move `from` or later may find fresh. Every
-    /// angle, and every bound of a stretch, stays the same. Looks at those in buckets with twice as many as it left there.
+    /// Leaves out segments that lie whole in others: those of both that no place of move `from` or later may
+    /// find fresh. Every angle, and every bound of a stretch, stays the same. Looks at those in buckets with
+    /// twice as many as it left there.
     fn thin(&mut self, from: usize) {
         /// Fewer are no matter.
         const FEW: usize = 24;
@@ -330,8 +335,8 @@ impl<'a> Swept<'a> {
         }
     }
 
-    /// Tells the segments that may come so near to a place, bucket by bucket in the order of the path, until `tell` has enough of
-    /// a bucket.
+    /// Tells the segments that may come so near to a place, bucket by bucket in the order of the path, until
+    /// `tell` has enough of a bucket.
     fn each_near(&self, place: &Point2, reach: f64, mut tell: impl FnMut(usize) -> bool) {
         let reach = Vector2::new(1.0, 1.0) * (reach + self.bucket);
         let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
@@ -402,8 +407,8 @@ impl<'a> Swept<'a> {
     fn deciding(&self, stretch: &Stretch, near: &[u32]) -> (f64, Vec<u32>) {
         let mut taking = Vec::new();
         let front = self.front(stretch, near, |k| taking.push(k));
-        // What those that took some cover from both ends they cover from everywhere between. Others can only matter where the
-        // rest stands.
+        // What those that took some cover from both ends they cover from everywhere between. Others can only
+        // matter where the rest stands.
         let reach = (1.0 + self.film) * self.radius + stretch.half;
         let mut took = taking.iter().copied().peekable();
         let matters = |k: &u32| {
@@ -413,7 +418,8 @@ impl<'a> Swept<'a> {
         (front.angle(), near.iter().copied().filter(matters).collect())
     }
 
-    /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`. It is known to be `most` at most.
+    /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`. It is known to be
+    /// `most` at most.
     fn bounded(&self, stretch: &Stretch, most: f64, near: &[u32], enough: f64, halvings: u32) -> [f64; 2] {
         if most <= enough + PRECISE {
             return [0.0, most.max(enough)];
@@ -434,8 +440,8 @@ impl<'a> Swept<'a> {
         self.front(stretch, near, |_| ()).angle()
     }
 
-    /// The front half of the circumference without what is cleared from everywhere on a stretch. Tells the segments that clear
-    /// some.
+    /// The front half of the circumference without what is cleared from everywhere on a stretch. Tells the
+    /// segments that clear some.
     fn front(&self, stretch: &Stretch, near: &[u32], mut tell: impl FnMut(u32)) -> Front {
         let gone = stretch.gone - stretch.half;
         let before = gone - self.fresh;
@@ -465,8 +471,9 @@ impl<'a> Swept<'a> {
         front
     }
 
-    /// The segments up to move `k` that a place of it can meet, the last first: the ground next to a place was mostly cleared
-    /// last, and what it leaves standing is soon so little that most others are passed over.
+    /// The segments up to move `k` that a place of it can meet, the last first: the ground next to a place
+    /// was mostly cleared last, and what it leaves standing is soon so little that most others are passed
+    /// over.
     fn near_move(&self, k: usize) -> Vec<u32> {
         let Segment { ends: [a, b], z, .. } = self.segments[k];
         let (middle, reach) = (a + 0.5 * (b - a), (2.0 + self.film) * self.radius + 0.5 * (b - a).norm());
@@ -557,8 +564,8 @@ impl Front {
         Vector2::new(cos, sin) * self.rim
     }
 
-    /// Clears what is nearer than `radius` to a segment wherever the circle is between `half` behind and `half` ahead; whether
-    /// any of it was standing.
+    /// Clears what is nearer than `radius` to a segment wherever the circle is between `half` behind and
+    /// `half` ahead; whether any of it was standing.
     fn clear(&mut self, ends: &[Vector2; 2], radius: f64, half: f64) -> bool {
         let behind = ends.map(|end| end + Vector2::new(half, 0.0));
         if behind[0].x.max(behind[1].x) + radius <= 0.0 || !self.may_clear(ends, radius) {
@@ -577,8 +584,8 @@ impl Front {
         taken
     }
 
-    /// Clears arcs between some angles, which are sorted and forgotten, where `clears` holds of their middles; whether any of it
-    /// was standing.
+    /// Clears arcs between some angles, which are sorted and forgotten, where `clears` holds of their
+    /// middles; whether any of it was standing.
     fn clear_between(&mut self, angles: &mut Vec<f64>, clears: impl Fn(&Self, f64) -> bool) -> bool {
         let Some([begin, end]) = self.span else { return false };
         angles.extend([begin, end]);
@@ -598,8 +605,8 @@ impl Front {
         taken
     }
 
-    /// Clears what lies in a region, and farther than `depth` from its sides: with that of half a stretch, wherever the circle is
-    /// on it. Below zero, what lies no farther outside counts as well.
+    /// Clears what lies in a region, and farther than `depth` from its sides: with that of half a stretch,
+    /// wherever the circle is on it. Below zero, what lies no farther outside counts as well.
     fn clear_region(&mut self, region: &RegionIndex, stretch: &Stretch, depth: f64) {
         let middle = stretch.middle;
         let reach = Vector2::new(1.0, 1.0) * (self.rim + depth.abs());
@@ -629,7 +636,8 @@ impl Front {
         self.parts.iter().any(|middle| square_distance(middle, ends) < square)
     }
 
-    /// Adds the angles where the circle crosses the border of the stadium around a segment, of those between the ends of what stands.
+    /// Adds the angles where the circle crosses the border of the stadium around a segment, of those between
+    /// the ends of what stands.
     fn crossings(&self, ends: &[Vector2; 2], radius: f64, found: &mut Vec<f64>) {
         let along = ends[1] - ends[0];
         let square = along.norm_squared();

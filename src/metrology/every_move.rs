@@ -41,9 +41,9 @@ impl<'a> EveryMove<'a> {
         (z < at.z - 0.5 * NUMERICAL_FLOOR).then_some(by)
     }
 
-    /// The move that cuts away what stands so high, mm, over a place of the design. A line along a normal may end at the side of what the
-    /// rim of a cutter swept: what stands is looked at just below. What is left for that and for [`Self::cuts_away`] is one
-    /// [`NUMERICAL_FLOOR`] together.
+    /// The move that cuts away what stands so high, mm, over a place of the design. A line along a normal may
+    /// end at the side of what the rim of a cutter swept: what stands is looked at just below. What is left
+    /// for that and for [`Self::cuts_away`] is one [`NUMERICAL_FLOOR`] together.
     pub fn cuts_away_over(&self, design: &SurfacePoint, height: f64) -> Option<u32> {
         self.cuts_away(&(design.point + design.normal * (height - 0.5 * NUMERICAL_FLOOR)))
     }

@@ -1,19 +1,20 @@
 //! The highest material anywhere above the design, with a true bound. mm.
 //!
-//! Enters: the cut surface over its grid, and the part. Leaves: the highest place and what may stand at most: in all, where
-//! passes came down to the design, and elsewhere.
+//! Enters: the cut surface over its grid, and the part. Leaves: the highest place and what may stand at most:
+//! in all, where passes came down to the design, and elsewhere.
 //!
-//! The bound rests on one fact. The surface that an upright convex cutter sweeps along a straight move is a convex
-//! function of x and y wherever it passes. So, over a polygon of the plan:
+//! The bound rests on one fact. The surface that an upright convex cutter sweeps along a straight move is a
+//! convex function of x and y wherever it passes. So, over a polygon of the plan:
 //!
 //! - what one move leaves above a plane is greatest at a corner of the polygon;
 //! - so is any mean of moves, by whatever weights;
 //! - the cut is nowhere above the lowest move, so nowhere above such a mean.
 //!
-//! The weights are chosen so that the greatest corner is lowest (the value of a matrix game). On a ridge the slopes of
-//! both passes then cancel, and the bound is off by second order only. The polygons are the part's triangles, each clipped
-//! by a square; so the part's borders and creases are borders of polygons, and nothing beyond them counts. Squares that may
-//! hold more than is known are divided until none does by more than was asked.
+//! The weights are chosen so that the greatest corner is lowest (the value of a matrix game). On a ridge the
+//! slopes of both passes then cancel, and the bound is off by second order only. The polygons are the part's
+//! triangles, each clipped by a square; so the part's borders and creases are borders of polygons, and
+//! nothing beyond them counts. Squares that may hold more than is known are divided until none does by more
+//! than was asked.
 
 mod outline;
 mod patch;
@@ -53,8 +54,8 @@ pub(super) struct ExcessSearch<'a> {
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
 const MOST_HIGH_CELLS: usize = 4096;
 
-/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures. What is told is how high it may
-/// be at most.
+/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures.
+/// What is told is how high it may be at most.
 const HIGH_SLACK: f64 = 0.01;
 
 /// How often such a cell is divided before it counts as low enough.
@@ -75,8 +76,8 @@ enum Kind {
 }
 
 impl ExcessSearch<'_> {
-    /// The figures, and one place of each cell where passes came down to the design and left more than the scallop limit.
-    /// `samples` are those of the grid's cells, `measured` what was found so far.
+    /// The figures, and one place of each cell where passes came down to the design and left more than the
+    /// scallop limit. `samples` are those of the grid's cells, `measured` what was found so far.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -103,7 +104,8 @@ impl ExcessSearch<'_> {
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
-        // Where nothing is known to stand above the limit, all that may has to be divided to tell, and crowds out what does.
+        // Where nothing is known to stand above the limit, all that may has to be divided to tell, and crowds
+        // out what does.
         let is_closer = known.max_mm < limits.scallop && !self.inspection.is_first_look;
         let closer_above = if is_closer { limits.scallop } else { f64::INFINITY };
         let open =
@@ -127,7 +129,8 @@ impl ExcessSearch<'_> {
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
-            // Nothing at all is higher than a ridge, which passes reached, or than another place that they did.
+            // Nothing at all is higher than a ridge, which passes reached, or than another place that they
+            // did.
             let is_known = highest.max_mm <= ridge.max_mm || self.is_reached(&highest);
             let reached = if is_known { highest } else { sought(ridge, Kind::Reached, fails(&unreached))? };
             (reached, unreached)
@@ -161,8 +164,8 @@ impl ExcessSearch<'_> {
         Ok((ExcessFigures { highest, kind, reached, unreached }, high))
     }
 
-    /// One place of each cell, `among` those asked for, where passes came down to the design and left more than the scallop limit, or
-    /// would by the last decimals of a program.
+    /// One place of each cell, `among` those asked for, where passes came down to the design and left more
+    /// than the scallop limit, or would by the last decimals of a program.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -180,8 +183,8 @@ impl ExcessSearch<'_> {
         self.high_places(&open.squares, high, most, &[], monitor)
     }
 
-    /// One place of each square where passes came down to the design and left more than is `high`, mm, the highest that is found
-    /// there by no more than `most` looks, with the height that it may have at most.
+    /// One place of each square where passes came down to the design and left more than is `high`, mm, the
+    /// highest that is found there by no more than `most` looks, with the height that it may have at most.
     fn high_places(
         &self,
         squares: &[Square],
@@ -238,9 +241,9 @@ impl ExcessSearch<'_> {
         Ok(found.into_iter().flatten().collect())
     }
 
-    /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own move leaves more at a
-    /// corner, those beside the part's border, and those whose centre cannot speak for them. Those that may hold more than
-    /// `closer_above`, mm, are bounded by their quarters.
+    /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own
+    /// move leaves more at a corner, those beside the part's border, and those whose centre cannot speak for
+    /// them. Those that may hold more than `closer_above`, mm, are bounded by their quarters.
     fn open(
         &self,
         samples: &[Sample],
@@ -327,8 +330,8 @@ impl ExcessSearch<'_> {
         cut.is_some_and(|cut| self.patches(0.0, &[]).reached(q, highest.max_mm, cut.by))
     }
 
-    /// Whether what stands so high, mm, on a place stands between the end of the part and the rim of a cutter that ends beside it by less
-    /// than a program's rounding.
+    /// Whether what stands so high, mm, on a place stands between the end of the part and the rim of a cutter
+    /// that ends beside it by less than a program's rounding.
     fn is_foil(&self, place: Point2, height: f64) -> bool {
         /// Other material rises by no more than so many times the way aside.
         const SLOPE: f64 = 10.0;
@@ -345,8 +348,9 @@ impl ExcessSearch<'_> {
                 .any(|q| is_level(q) && self.cut_away_below([q.x, q.y], below).is_some())
     }
 
-    /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut away what seemed to be
-    /// the highest are added to those that no cell saw. Where the part `fails` whatever is found, a bound that can decide no limit stays wide.
+    /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to
+    /// have cut away what seemed to be the highest are added to those that no cell saw. Where the part
+    /// `fails` whatever is found, a bound that can decide no limit stays wide.
     fn highest(
         &self,
         open: &Promising,
@@ -419,8 +423,8 @@ impl ExcessSearch<'_> {
         Ok(highest)
     }
 
-    /// The cells in which the part has details that their centres do not show: triangles narrower than two cells that bend
-    /// away from their neighbours, or end.
+    /// The cells in which the part has details that their centres do not show: triangles narrower than two
+    /// cells that bend away from their neighbours, or end.
     fn finer_than_cells(&self, grid: &Grid) -> Vec<AtomicBool> {
         /// Neighbours that turn by less, rad, are part of a bend that the cells' normals show.
         const BENT: f64 = 0.05;

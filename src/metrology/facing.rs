@@ -1,10 +1,11 @@
 //! What of the design surface the tool of a path can face.
 //!
-//! Enters: the part, the path, and the block that it is cut from. Leaves: the kind of each place of the surface, by its
-//! outward unit normal and by what of the part lies over it. mm.
+//! Enters: the part, the path, and the block that it is cut from. Leaves: the kind of each place of the
+//! surface, by its outward unit normal and by what of the part lies over it. mm.
 //!
-//! A tool with the axis `a` (from tip to holder) faces a place with the normal `n` where `n·a > 0`. Upright tools also need
-//! that no other surface of the part lies over the place. Tools that lean come in from the side; for them nothing is hidden.
+//! A tool with the axis `a` (from tip to holder) faces a place with the normal `n` where `n·a > 0`. Upright
+//! tools also need that no other surface of the part lies over the place. Tools that lean come in from the
+//! side; for them nothing is hidden.
 
 use std::collections::HashSet;
 
@@ -14,18 +15,21 @@ use part::Part;
 use serde::Serialize;
 use work::parallel;
 
-/// Where the vertical part of the design's normal is no greater, no upright cutter faces the surface, and a cell says nothing
-/// of it. A greater one leaves drafts of walls unmeasured; below rounding of mesh files, walls pass for slopes.
+/// Where the vertical part of the design's normal is no greater, no upright cutter faces the surface, and a
+/// cell says nothing of it. A greater one leaves drafts of walls unmeasured; below rounding of mesh files,
+/// walls pass for slopes.
 pub(crate) const LEAST_FACING: f64 = 1e-3;
 
-/// Axes that differ by less than this in each coordinate are one. Coarser ones call places walls that a tool faces by less than
-/// that; finer ones cost time on long paths.
+/// Axes that differ by less than this in each coordinate are one. Coarser ones call places walls that a tool
+/// faces by less than that; finer ones cost time on long paths.
 const SAME_AXIS: f64 = 1e-2;
 
-/// What lies this far over a place, mm, beside what the part's triangles are off its surface, is another surface.
+/// What lies this far over a place, mm, beside what the part's triangles are off its surface, is another
+/// surface.
 const ABOVE: f64 = 1e-6;
 
-/// So far before a wall it is looked whether other surface lies over it, mm: more than rounding of mesh files.
+/// So far before a wall it is looked whether other surface lies over it, mm: more than rounding of mesh
+/// files.
 const BEFORE: f64 = 1e-3;
 
 /// What of a part is judged.
@@ -155,7 +159,8 @@ impl<'a> Facing<'a> {
         }
         if self.axes.is_empty() {
             return match normal.z {
-                // The tool meets the back of it. No cell measures that, and to leave it out would pass what nobody saw.
+                // The tool meets the back of it. No cell measures that, and to leave it out would pass what
+                // nobody saw.
                 z if z < -LEAST_FACING && self.soup && !self.is_covered(point, -near / z) => {
                     PlaceKind::Facing
                 }

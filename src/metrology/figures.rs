@@ -38,8 +38,8 @@ pub struct RidgePlace {
     pub height: f64,
 }
 
-/// Ridges above this share of the scallop limit come near it: what is cut once more, with moves that are a little others,
-/// may stand above it.
+/// Ridges above this share of the scallop limit come near it: what is cut once more, with moves that are a
+/// little others, may stand above it.
 pub(crate) const NEAR_LIMIT: f64 = 0.985;
 
 /// Which ridges may exceed the scallop target. By default none may.
@@ -261,8 +261,8 @@ pub enum ExcessKind {
     Uncut,
 }
 
-/// The highest material anywhere on what was judged. Scallops and remnants along borders are reached: they answer to the
-/// scallop tolerance. What no pass came down to answers to the uncut tolerance.
+/// The highest material anywhere on what was judged. Scallops and remnants along borders are reached: they
+/// answer to the scallop tolerance. What no pass came down to answers to the uncut tolerance.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ExcessFigures {
     /// The highest of all.
@@ -344,8 +344,9 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
-    /// Places on ridges that cells show near the scallop limit or above it, and all others that stand above it, within the uncut tolerance:
-    /// where passes lie too far apart, or as far as they may. Those between centres have the height that they may have at most.
+    /// Places on ridges that cells show near the scallop limit or above it, and all others that stand above
+    /// it, within the uncut tolerance: where passes lie too far apart, or as far as they may. Those between
+    /// centres have the height that they may have at most.
     pub above: Vec<RidgePlace>,
     /// Scallops of pairs of passes, calculated beside measured.
     pub pairs: PairFigures,
@@ -354,7 +355,8 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Widens the bounds of all heights and depths by how far the path may be off the one that was measured, mm.
+    /// Widens the bounds of all heights and depths by how far the path may be off the one that was measured,
+    /// mm.
     pub fn widen(&mut self, by: f64) {
         let Self { scallop, gouge, uncut, excess, .. } = self;
         gouge.at_least_mm = (gouge.at_least_mm - by).max(0.0);

@@ -32,7 +32,8 @@ pub(super) fn plane([x, y]: [f64; 2]) -> Part {
     Part::from_mesh(TriangleMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]).unwrap().0)
 }
 
-/// What a cutter cuts too deep from a block a millimetre higher than a part, along passes of its tip, by cells.
+/// What a cutter cuts too deep from a block a millimetre higher than a part, along passes of its tip, by
+/// cells.
 pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cell: f64) -> GougeFigures {
     let path = path(passes);
     let top = part.bounds().max.z + 1.0;

@@ -39,11 +39,12 @@ const RIDGE_IS_TOP: f64 = 1e-3;
 /// Tracks of fewer cells beat with them. Wider ones show in their cells as they are.
 const NARROW: usize = 3;
 
-/// Where so large a share of the cells lies in such tracks, the mean deviation is taken at places spread over the cells.
+/// Where so large a share of the cells lies in such tracks, the mean deviation is taken at places spread over
+/// the cells.
 const CROWDED_SHARE: f64 = 0.25;
 
-/// Powers of the inverse of the number whose cube is one more than itself: their multiples fill a square evenly (M. Roberts,
-/// "The unreasonable effectiveness of quasirandom sequences", 2018).
+/// Powers of the inverse of the number whose cube is one more than itself: their multiples fill a square
+/// evenly (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
 const EVEN: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
@@ -87,7 +88,8 @@ pub(super) struct Inspection<'a> {
     /// Where the passes of that surface meet.
     pub meetings: &'a Meetings<'a>,
     pub grid: Grid,
-    /// Where the vertical part of the design's normal is less, faces are measured elsewhere: bounds do not cover them.
+    /// Where the vertical part of the design's normal is less, faces are measured elsewhere: bounds do not
+    /// cover them.
     pub steepest: f64,
     /// The creases of the part, where gouges are sought between the centres of cells.
     pub creases: Option<&'a Creases>,
@@ -162,7 +164,8 @@ impl Inspection<'_> {
         Some((self.on_ridge(p, normal, -distance).unwrap_or(found), false))
     }
 
-    /// The cut of a ridge that is thinner than the cut along the normal is deep, mm; its slope is how much deeper it may be beside.
+    /// The cut of a ridge that is thinner than the cut along the normal is deep, mm; its slope is how much
+    /// deeper it may be beside.
     pub fn on_ridge(&self, p: &Point3, normal: &Vector3, depth: f64) -> Option<Deviation> {
         // Below the highest surface it is solid, whatever a file has there.
         let is_highest = |other: &SurfacePoint| {
@@ -198,8 +201,8 @@ impl Inspection<'_> {
         }
     }
 
-    /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the normals of the design
-    /// beside it, mm; infinite where these cannot tell.
+    /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the
+    /// normals of the design beside it, mm; infinite where these cannot tell.
     fn top(&self, design: &SurfaceGrid, (i, j): (usize, usize), p: &Point3, cut: &Deviation) -> f64 {
         let normal = design.at(i, j).normal;
         // The cut over a place stands aside of it where the normal leans.
@@ -235,7 +238,8 @@ impl Inspection<'_> {
         if top <= high { top } else { f64::INFINITY }
     }
 
-    /// Area of the design surface that cell `k` stands for, mm²: no more than lies in the part's rectangle of the plan.
+    /// Area of the design surface that cell `k` stands for, mm²: no more than lies in the part's rectangle of
+    /// the plan.
     fn area(&self, k: usize, sample: &Sample) -> f64 {
         let (centre, bounds) = (self.centre(k), self.part.bounds());
         let breadth = |i: usize| self.grid.breadth(centre[i], [bounds.min[i], bounds.max[i]]).max(0.0);
@@ -252,8 +256,9 @@ impl Inspection<'_> {
         self.grid.centre(k % self.grid.nx, k / self.grid.nx)
     }
 
-    /// Figures of the deviations at the centres. Where passes are about as near to each other as the cells are, centres lie on
-    /// ridges, or between them, by chance: there the mean is that of places spread over the cells.
+    /// Figures of the deviations at the centres. Where passes are about as near to each other as the cells
+    /// are, centres lie on ridges, or between them, by chance: there the mean is that of places spread over
+    /// the cells.
     pub fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
         let figures = DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(k, &samples[k]))));
         let row = |j: usize| (0..self.grid.nx).map(move |i| self.grid.index(i, j));
@@ -284,8 +289,8 @@ impl Inspection<'_> {
         along(k % nx, nx, 1) || along(k / nx, ny, nx)
     }
 
-    /// The moves that may touch the design near a place of a cell, where its cutter is the one there. What passes more than a
-    /// cell above the cell's own height is no cut of it.
+    /// The moves that may touch the design near a place of a cell, where its cutter is the one there. What
+    /// passes more than a cell above the cell's own height is no cut of it.
     pub fn passing(&self, k: usize, point: &Point3, normal: &Vector3) -> Vec<u32> {
         let cutter = self.cutters.of_move(self.surface.cut.cut_by[k]);
         let passing = self.meetings.passing((point + cutter.contact_to_tip(normal)).xy());
@@ -294,7 +299,8 @@ impl Inspection<'_> {
         passing.iter().filter(cuts).copied().collect()
     }
 
-    /// The deviation at a place of a cell that differs from cell to cell: they fill the cells evenly, along any line of them.
+    /// The deviation at a place of a cell that differs from cell to cell: they fill the cells evenly, along
+    /// any line of them.
     fn beside_centre(&self, k: usize) -> Option<f64> {
         let [i, j] = [k % self.grid.nx, k / self.grid.nx].map(|n| n as f64);
         let share = |a: f64, b: f64| (i * a + j * b).fract() - 0.5;
@@ -360,8 +366,9 @@ impl Inspection<'_> {
         Value { here: -d.distance, possible: -d.distance + d.slope * reach(half, lean) }
     }
 
-    /// The greatest value above `known` in the squares of `cells` and those along `creases`, and what may be there at most.
-    /// `value` makes it of a deviation, the lean of the design's normal, and half the side of a square.
+    /// The greatest value above `known` in the squares of `cells` and those along `creases`, and what may be
+    /// there at most. `value` makes it of a deviation, the lean of the design's normal, and half the side of
+    /// a square.
     fn between_centres(
         &self,
         cells: impl Iterator<Item = usize>,
@@ -434,8 +441,9 @@ impl Inspection<'_> {
         Some((counted.map_or(-d.distance, |counted| counted.here), design.point, d.by))
     }
 
-    /// Raises the deepest gouge to that of moves which stand deeper in the design than the cells show: they may be lowest at no centre, or
-    /// beside one that another move cut. Leaves the places where one may stand deeper yet.
+    /// Raises the deepest gouge to that of moves which stand deeper in the design than the cells show: they
+    /// may be lowest at no centre, or beside one that another move cut. Leaves the places where one may stand
+    /// deeper yet.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -457,7 +465,8 @@ impl Inspection<'_> {
             let mut deepest: Option<(f64, Point3, u32)> = None;
             for dip in &mut left {
                 monitor::check(monitor)?;
-                // A ridge, or a wall, may be cut less deep than the cutter stands in it. What is steep is measured elsewhere.
+                // A ridge, or a wall, may be cut less deep than the cutter stands in it. What is steep is
+                // measured elsewhere.
                 let is_own = self.design_at(dip.at).is_some_and(|design| design.normal.z >= self.steepest);
                 let found = self.depth_with(dip.at, &[dip.by]).filter(|_| is_own);
                 let depth = found.map_or(f64::NEG_INFINITY, |(depth, ..)| depth);
@@ -474,7 +483,8 @@ impl Inspection<'_> {
         Ok(left)
     }
 
-    /// Lists a gouge with its depth, place and move: as the deepest of the region of cells there, or beside it, or as one that no centre saw.
+    /// Lists a gouge with its depth, place and move: as the deepest of the region of cells there, or beside
+    /// it, or as one that no centre saw.
     pub(super) fn list_gouge(
         &self,
         samples: &[Sample],
@@ -643,8 +653,8 @@ mod tests {
 
     use crate::flat_scene::{gouge_of, plane};
 
-    /// Passes half way between the centres of cells, each of which dips at one place: the centres around it are cut by other passes, or
-    /// higher up. On cells of every size the deepest dip is told.
+    /// Passes half way between the centres of cells, each of which dips at one place: the centres around it
+    /// are cut by other passes, or higher up. On cells of every size the deepest dip is told.
     #[test]
     fn a_dip_between_centres_is_as_deep_on_cells_of_every_size() {
         let (cutter, step) = (Cutter::ball(2.0).unwrap(), 0.2);

@@ -1,25 +1,28 @@
 //! Measures the cut surface against the design part, never against a planner's own prediction.
 //!
-//! Enters: the part, the stock after a path, and the path. Leaves: signed deviation at a design
-//! point above or below every cell centre, the heights of the scallop ridges, gouges and uncut
-//! places as connected regions, and a bound of the error beside each figure. mm throughout.
+//! Enters: the part, the stock after a path, and the path. Leaves: signed deviation at a design point above
+//! or below every cell centre, the heights of the scallop ridges, gouges and uncut places as connected
+//! regions, and a bound of the error beside each figure. mm throughout.
 //!
-//! Deviation at a design point is the signed distance along its outward normal to the cut surface:
-//! positive is excess, negative is gouge. On a sharp ridge, where the way down along the normal may run along the other face, a cut is no deeper
-//! than the ridge is lower (`beneath`).
+//! Deviation at a design point is the signed distance along its outward normal to the cut surface: positive
+//! is excess, negative is gouge. On a sharp ridge, where the way down along the normal may run along the
+//! other face, a cut is no deeper than the ridge is lower (`beneath`).
 //!
 //! A bound says how much a figure may differ from the truth:
 //!
 //! - scallop: how much higher a ridge may be between two grid lines, by its slope against the design;
-//! - gouge: how much deeper a cut may be between centres, by its slope, but no more than a cutter of its radius can do;
+//! - gouge: how much deeper a cut may be between centres, by its slope, but no more than a cutter of its
+//!   radius can do;
 //! - uncut: how much higher a region may be between centres, by its slope.
 //!
-//! Where a bound exceeds what the scene asks for, the closed-form surface is searched between the centres. Places that a
-//! move or stock may reach unseen are cut anew on finer cells. Areas and shares stay those of the grid.
+//! Where a bound exceeds what the scene asks for, the closed-form surface is searched between the centres.
+//! Places that a move or stock may reach unseen are cut anew on finer cells. Areas and shares stay those of
+//! the grid.
 //!
-//! A ridge is a scallop where one of its passes touches the design nearby. Else it stands in a hollow that the cutter does
-//! not fit. A place above the uncut tolerance is uncut, unless a pass came down to the design there and the place is no higher
-//! than the highest scallop. So a tall scallop, or half of one at the border, is a bad scallop and not an uncut place.
+//! A ridge is a scallop where one of its passes touches the design nearby. Else it stands in a hollow that
+//! the cutter does not fit. A place above the uncut tolerance is uncut, unless a pass came down to the design
+//! there and the place is no higher than the highest scallop. So a tall scallop, or half of one at the
+//! border, is a bad scallop and not an uncut place.
 
 mod along_normals;
 mod beneath;

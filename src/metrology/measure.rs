@@ -1,4 +1,5 @@
-//! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
+//! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide.
+//! mm.
 
 use super::beside_border::Borders;
 use super::coverage::STEEP;
@@ -32,8 +33,8 @@ use work::monitor::Monitor;
 /// greatest scallop, gouge and uncut height are the asked ones. Where they do not come down to that, a note
 /// in [`Measurement::refined`] says so.
 ///
-/// The tool must be upright all along `path`, and `cut` must be what [`sim::cut`] left along this path with this cutter, of
-/// stock that lies over all of the part.
+/// The tool must be upright all along `path`, and `cut` must be what [`sim::cut`] left along this path with
+/// this cutter, of stock that lies over all of the part.
 ///
 /// # Errors
 /// [`MeasureError`] where that is not so, or when the monitor says so.
@@ -51,8 +52,8 @@ pub fn measure(
     Ok(measure_with_walls(part, &cutter.into(), path, cut, limits, asked, None, monitor)?)
 }
 
-/// As [`measure`], each move by its own cutter, and the part's vertical walls too, as far as they are walls to the path. Path
-/// and stock are not checked: an engine has just cut the one along the other.
+/// As [`measure`], each move by its own cutter, and the part's vertical walls too, as far as they are walls
+/// to the path. Path and stock are not checked: an engine has just cut the one along the other.
 ///
 /// # Errors
 /// [`CutError::Cancelled`] when the monitor says so.
@@ -144,8 +145,8 @@ pub(crate) fn measure_with_walls(
     Ok(measured)
 }
 
-/// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
-/// than it.
+/// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others
+/// stand no higher than it.
 fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
     let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
@@ -172,8 +173,8 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
 }
 
-/// The highest uncut place is the highest material that passes did not come down to, where that is higher than what cells show, or where
-/// moves that no cell saw cut away what they show.
+/// The highest uncut place is the highest material that passes did not come down to, where that is higher
+/// than what cells show, or where moves that no cell saw cut away what they show.
 fn tell_uncut(measured: &mut Measurement, limits: &Limits) {
     let (unreached, uncut) = (measured.excess.unreached, &mut measured.uncut);
     let (shown, most) = (uncut.max_height_mm, unreached.at_most());
@@ -189,8 +190,8 @@ fn tell_uncut(measured: &mut Measurement, limits: &Limits) {
     }
 }
 
-/// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
-/// grid's lines, and rise between them.
+/// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges
+/// are measured on the grid's lines, and rise between them.
 fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
     /// Two passes leave equally much where their heights differ by no more than this share of it.
     const EQUAL: f64 = 0.05;
@@ -219,8 +220,8 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
     }
 }
 
-/// Where a move that no cell saw cuts the highest uncut place away, the figure is too great by an unknown amount: its bound becomes the
-/// figure itself. Whether that is so.
+/// Where a move that no cell saw cuts the highest uncut place away, the figure is too great by an unknown
+/// amount: its bound becomes the figure itself. Whether that is so.
 fn doubt(measured: &mut Measurement, part: &Part, every_move: &EveryMove<'_>, asked: f64) -> bool {
     let uncut = &mut measured.uncut;
     let cut_away = |at: &Point3| every_move.cuts_away(&(at - Vector3::z() * asked)).is_some();

@@ -1,5 +1,5 @@
-//! Whether a stock is what a path left over a part. What a measurement reads from cells and what it asks moves for would
-//! contradict each other elsewhere.
+//! Whether a stock is what a path left over a part. What a measurement reads from cells and what it asks
+//! moves for would contradict each other elsewhere.
 
 use cutter::Cutter;
 use geometry::Point2;
@@ -80,8 +80,8 @@ impl From<CutError> for MeasureError {
     }
 }
 
-/// Whether `cut` lies over the part and is what the path left: every cell stands where the move that it names cuts, and none
-/// higher than the middle of any move.
+/// Whether `cut` lies over the part and is what the path left: every cell stands where the move that it names
+/// cuts, and none higher than the middle of any move.
 pub(super) fn check_stock(
     part: &Part,
     cutter: &Cutter,

@@ -1,9 +1,9 @@
 //! Where the cuts of two passes meet on a line between two points: the ridge in closed form.
 //!
-//! Enters: the cut surface, and a line on whose ends it is known which move is lowest. Leaves: every
-//! place on the line where the lowest move changes from one track to another, mm. Moves that are
-//! lowest only between the ends are found on the way. Where passes are nearer to each other than cells, no cell may have seen
-//! the pass between two others; so the tracks beside each meeting are asked, too.
+//! Enters: the cut surface, and a line on whose ends it is known which move is lowest. Leaves: every place on
+//! the line where the lowest move changes from one track to another, mm. Moves that are lowest only between
+//! the ends are found on the way. Where passes are nearer to each other than cells, no cell may have seen the
+//! pass between two others; so the tracks beside each meeting are asked, too.
 
 use super::cut_surface::{CutPoint, CutSurface};
 use super::tracks::Tracks;
@@ -24,15 +24,15 @@ const CROSSING: f64 = 1e-10;
 /// Gaps narrower than this are not seen.
 const EDGE: f64 = 1e-6;
 
-/// Between two tracks the cut of a third is half as wide as they are apart. So where they are farther apart than two cells, cells
-/// saw it; on curved parts it may be narrower.
+/// Between two tracks the cut of a third is half as wide as they are apart. So where they are farther apart
+/// than two cells, cells saw it; on curved parts it may be narrower.
 const HIDDEN_WITHIN: f64 = 3.0;
 
 /// Cells along the side of a bin of tracks.
 const CELLS_PER_BIN: usize = 4;
 
-/// Moves that a bin holds on average at most, several passes of them: all are asked at every place where cells are coarser than
-/// that, and only the nearest can be lowest.
+/// Moves that a bin holds on average at most, several passes of them: all are asked at every place where
+/// cells are coarser than that, and only the nearest can be lowest.
 const MOVES_PER_BIN: f64 = 128.0;
 
 /// A place where two cuts are equally high and none is lower.
@@ -119,7 +119,8 @@ impl<'a> Meetings<'a> {
         self.search(at, a, b, MOST_DEPTH, found, &mut |_| {});
     }
 
-    /// As [`Meetings::between`] where `a` and `b` met nearby: those between them and one that has come in between.
+    /// As [`Meetings::between`] where `a` and `b` met nearby: those between them and one that has come in
+    /// between.
     pub fn again_between(
         &self,
         at: &dyn Fn(f64) -> Point2,
@@ -186,8 +187,8 @@ impl<'a> Meetings<'a> {
         }
     }
 
-    /// The lowest cut at a place where two tracks meet that are so near to each other that no cell may have seen another between
-    /// them.
+    /// The lowest cut at a place where two tracks meet that are so near to each other that no cell may have
+    /// seen another between them.
     fn hidden(&self, q: Point2, z: f64, moves: [u32; 2]) -> Option<CutPoint> {
         let envelope = &self.surface.envelope;
         let tip = |by: u32| {
@@ -263,7 +264,8 @@ mod tests {
     use sim::{Grid, ZMap, cut};
     use work::monitor::Silent;
 
-    /// Passes about as far apart as the cells, and much nearer: every one of them leaves its ridge, though no cell saw it.
+    /// Passes about as far apart as the cells, and much nearer: every one of them leaves its ridge, though no
+    /// cell saw it.
     #[test]
     fn passes_that_no_cell_saw_leave_their_ridges() {
         let ([x, y], cell) = ([6.0, 5.0], 0.1);

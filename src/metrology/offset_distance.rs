@@ -1,13 +1,14 @@
-//! How far a surface lies from a design surface: the true distance of an offset, whatever way it was made, and where the
-//! design is too concave for it.
+//! How far a surface lies from a design surface: the true distance of an offset, whatever way it was made,
+//! and where the design is too concave for it.
 //!
 //! Enters: surfaces, mm, a part, and the distance that was asked for. Leaves: least, greatest, mean and root
-//! mean square, with places and a bound of the error; singular places of the offset. Distances are those to the
-//! nearest point of the part, refined on its exact patches. Places whose nearest point lies on the part's border, where no
-//! normal of the part reaches them, are counted and left out.
+//! mean square, with places and a bound of the error; singular places of the offset. Distances are those to
+//! the nearest point of the part, refined on its exact patches. Places whose nearest point lies on the part's
+//! border, where no normal of the part reaches them, are counted and left out.
 //!
-//! Surfaces are asked at the middles of cells of their parameters. Over a cell the distance changes by no more than its slope
-//! times the way to the farthest corner, to first order; cells that may hold more than the extremes are divided.
+//! Surfaces are asked at the middles of cells of their parameters. Over a cell the distance changes by no
+//! more than its slope times the way to the farthest corner, to first order; cells that may hold more than
+//! the extremes are divided.
 
 use serde::Serialize;
 
@@ -23,7 +24,8 @@ const ALONG_NORMAL: f64 = 1.0e-4;
 /// Cells that may exceed the extremes by no more than this, mm, are not divided. Less costs looks.
 const ENOUGH: f64 = 1.0e-4;
 
-/// Divisions of a cell, and looks at cells in all, at most: an extreme along a whole border asks for ever more of them.
+/// Divisions of a cell, and looks at cells in all, at most: an extreme along a whole border asks for ever
+/// more of them.
 const MOST_ROUNDS: usize = 12;
 const MOST_LOOKS: usize = 40_000;
 
@@ -142,9 +144,9 @@ impl Gauge<'_> {
     }
 }
 
-/// Distance of `surfaces` from `design` at the middles of `cells[0] × cells[1]` equal cells of the parameters of each, and
-/// closer where the extremes may be; `asked`, mm, is the distance that they should have. `None` where no place is beside the
-/// inside of the part.
+/// Distance of `surfaces` from `design` at the middles of `cells[0] × cells[1]` equal cells of the parameters
+/// of each, and closer where the extremes may be; `asked`, mm, is the distance that they should have. `None`
+/// where no place is beside the inside of the part.
 ///
 /// # Tolerance
 /// See [`OffsetDistance::error_bound_mm`].
@@ -233,8 +235,8 @@ pub struct OffsetFigures {
     pub singular_places: Vec<SingularPlaceFigures>,
 }
 
-/// The offset surface of a path, against the part: the `given` surfaces (from sections offset in their planes), or those
-/// that the part's patches truly have. `None` of a mesh.
+/// The offset surface of a path, against the part: the `given` surfaces (from sections offset in their
+/// planes), or those that the part's patches truly have. `None` of a mesh.
 pub fn offset_figures(part: &Part, radius: f64, given: Option<&[NurbsSurface]>) -> Option<OffsetFigures> {
     if part.patches().is_empty() {
         return None;

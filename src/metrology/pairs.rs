@@ -1,17 +1,19 @@
-//! The scallop of every pair of neighbouring passes: calculated from the path beside measured on the cut surface.
+//! The scallop of every pair of neighbouring passes: calculated from the path beside measured on the cut
+//! surface.
 //!
-//! Enters: the crossings of the measured ridges, the part and the finished path. Leaves: for each pair of passes that meet
-//! in a ridge its measured height, and what the path alone says it should be, mm.
+//! Enters: the crossings of the measured ridges, the part and the finished path. Leaves: for each pair of
+//! passes that meet in a ridge its measured height, and what the path alone says it should be, mm.
 //!
-//! At a place of the design below a crossing stands the section across both tracks. There the place is found from which the
-//! nearest ball centres of both tracks on the finished path are a radius away, begun where the two nearest balls meet
-//! ([`scallop::ridge_between`]); its distance from the design is the calculated height. No planner's prediction
-//! enters, and nothing of the cut surface but which two moves meet near which place. Beside it stands the height on a
-//! circular section: the chord between the contacts, and the design's curvature across the feed. It takes the balls to touch
-//! the design, so that it knows nothing of chords, and takes the passes to be parallel.
+//! At a place of the design below a crossing stands the section across both tracks. There the place is found
+//! from which the nearest ball centres of both tracks on the finished path are a radius away, begun where the
+//! two nearest balls meet ([`scallop::ridge_between`]); its distance from the design is the calculated
+//! height. No planner's prediction enters, and nothing of the cut surface but which two moves meet near which
+//! place. Beside it stands the height on a circular section: the chord between the contacts, and the design's
+//! curvature across the feed. It takes the balls to touch the design, so that it knows nothing of chords, and
+//! takes the passes to be parallel.
 //!
-//! Newton's method searches both tracks at once. Letting the ridge and the nearest centres find each other in turn does not
-//! converge: where the design's normal is not square to the tracks, both wander along them.
+//! Newton's method searches both tracks at once. Letting the ridge and the nearest centres find each other in
+//! turn does not converge: where the design's normal is not square to the tracks, both wander along them.
 //!
 //! Turns of a spiral are one pass: all their ridges are those of a pass with itself.
 
@@ -28,15 +30,16 @@ use motion::{Cutters, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Calculated places along a ridge are this share of the ball's radius apart. More cost time, fewer miss how a ridge
-/// changes.
+/// Calculated places along a ridge are this share of the ball's radius apart. More cost time, fewer miss how
+/// a ridge changes.
 const PLACES_OVER_RADIUS: f64 = 1.0 / 6.0;
 
-/// At least so many crossings for one that is calculated: more of them cost memory where passes are a cell apart.
+/// At least so many crossings for one that is calculated: more of them cost memory where passes are a cell
+/// apart.
 const LEAST_ONE_IN: usize = 8;
 
-/// A pair is parallel when it is so at this share of its places; a few stand at ends, corners and links. Figures of parallel
-/// pairs leave those out.
+/// A pair is parallel when it is so at this share of its places; a few stand at ends, corners and links.
+/// Figures of parallel pairs leave those out.
 const MOSTLY: f64 = 0.9;
 
 /// Numerical floor of a calculated height, mm: the foot on the design, and the ridge's own evaluation.
@@ -73,8 +76,8 @@ pub(super) struct PairTally {
     chosen: Vec<Chosen>,
 }
 
-/// A crossing as it is kept: where passes are one cell apart, every cell has one. Rounding moves the place by 0.1 µm at most
-/// on parts of a metre, and the height by a ten-millionth.
+/// A crossing as it is kept: where passes are one cell apart, every cell has one. Rounding moves the place by
+/// 0.1 µm at most on parts of a metre, and the height by a ten-millionth.
 #[derive(Debug, Clone, Copy)]
 struct Chosen {
     at: [f32; 3],

@@ -1,9 +1,10 @@
 //! Whether moves come down into stock or into ground that is cleared.
 //!
-//! Enters: the moves in order, what stood before, what the cutter may sweep. Leaves: of a move, whether stock stands where it comes down to.
-//! What earlier moves swept no higher is a union of stadiums, each convex: a square whose corners lie in one is cleared whole. Squares are
-//! divided until they are, or one shows stock. Films up to [`UNCOUNTED_LAYER`](super::UNCOUNTED_LAYER) of the radius, as the engagement leaves
-//! them out, are no stock; mm.
+//! Enters: the moves in order, what stood before, what the cutter may sweep. Leaves: of a move, whether stock
+//! stands where it comes down to. What earlier moves swept no higher is a union of stadiums, each convex: a
+//! square whose corners lie in one is cleared whole. Squares are divided until they are, or one shows stock.
+//! Films up to [`UNCOUNTED_LAYER`](super::UNCOUNTED_LAYER) of the radius, as the engagement leaves them out,
+//! are no stock; mm.
 
 use geometry::{Aabb, CurveSegment, Point2, Region, RegionIndex, SegmentGrid, Vector2, foot};
 use motion::Toolpath;
@@ -139,7 +140,8 @@ mod tests {
         Region::nested(vec![corners.map(|(x, y)| Point2::new(x, y)).to_vec()]).unwrap().0
     }
 
-    /// Two passes side by side clear the ground between them; a third beside them comes down on it, on its border, or into stock.
+    /// Two passes side by side clear the ground between them; a third beside them comes down on it, on its
+    /// border, or into stock.
     #[test]
     fn ground_that_was_cleared_is_known() {
         let at = |x: f64, y: f64, z: f64| ClPoint::upright(Point3::new(x, y, z));

@@ -1,8 +1,9 @@
 //! What is measured of a pocket besides its floor: cuts beyond its walls, and the engagement.
 //!
-//! Enters: region, cutter, path, the cut stock. Leaves: how far the cutter cut beyond the outline in the
-//! plan view, once from the moves in closed form and once from the cells of the simulated stock, which know
-//! nothing of each other; mm. Where moves lie does not matter, nor who planned them: programs also come from beside the stock.
+//! Enters: region, cutter, path, the cut stock. Leaves: how far the cutter cut beyond the outline in the plan
+//! view, once from the moves in closed form and once from the cells of the simulated stock, which know
+//! nothing of each other; mm. Where moves lie does not matter, nor who planned them: programs also come from
+//! beside the stock.
 
 use serde::Serialize;
 
@@ -126,7 +127,8 @@ pub struct EngagementFigures {
     pub engagement_limit_deg: f64,
     /// Share of the cutting length above it.
     pub over_engagement_limit_fraction: f64,
-    /// The stretches above it, the longest first and [`LISTED`](PocketFigures::LISTED) at most; none where no engagement was asked for.
+    /// The stretches above it, the longest first and [`LISTED`](PocketFigures::LISTED) at most; none where no
+    /// engagement was asked for.
     pub over_engagement_limit: Vec<ExceedingStretch>,
     /// How many there are.
     pub over_engagement_limit_count: usize,
@@ -159,7 +161,8 @@ pub fn stock_beside(free: &Region, block: &Aabb) -> RegionIndex {
     RegionIndex::new(whole.without(free))
 }
 
-/// How far a cutter came into the [stock beside](stock_beside) a pocket, and on which move: every move below `top`, mm.
+/// How far a cutter came into the [stock beside](stock_beside) a pocket, and on which move: every move below
+/// `top`, mm.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -334,7 +337,8 @@ mod tests {
         let ((exact, at), (cells, _)) = measured(10.0, 32.0);
         assert!((exact - 5.0).abs() < 1e-12 && at == 2 && (cells - 5.0).abs() < 0.075, "{exact} {cells}");
     }
-    /// A program mills an island away, comes from beside the stock, leaves over the top, and goes down beside a wall with the round of a ball.
+    /// A program mills an island away, comes from beside the stock, leaves over the top, and goes down beside
+    /// a wall with the round of a ball.
     #[test]
     fn moves_from_anywhere_are_held_against_walls() {
         let rectangle = |x: [f64; 2], y: [f64; 2]| {

@@ -40,7 +40,8 @@ pub struct Asked {
     pub error_bound: f64,
     /// Height of the stock's flat top before the cut, mm.
     pub stock_top: f64,
-    /// Whether cuts beside the part's borders are looked for. Beside the floor of a pocket stand its walls, which tell theirs.
+    /// Whether cuts beside the part's borders are looked for. Beside the floor of a pocket stand its walls,
+    /// which tell theirs.
     pub border_cuts: bool,
     /// Cells that may be held beside those of the stock at a time.
     pub most_cells: usize,
@@ -48,8 +49,8 @@ pub struct Asked {
     pub most_squares: usize,
     /// Whether finer cells follow where this measurement leaves a limit open: then it gives up early.
     pub is_first_look: bool,
-    /// Whether steep faces are measured along their normals beside this ([`crate::Coverage::measure_unseen`]): what cells see
-    /// of them counts, and bounds do not cover them.
+    /// Whether steep faces are measured along their normals beside this
+    /// ([`crate::Coverage::measure_unseen`]): what cells see of them counts, and bounds do not cover them.
     pub steep_elsewhere: bool,
 }
 

@@ -1,8 +1,9 @@
 //! Figures of what a program removes on its way: volume, rate, engagement, rapid moves in stock.
 //!
-//! Enters: the path and what an engine that keeps the order of the program found for each of its moves: the z-map of
-//! upright tools, or voxels. Leaves: the figures of report.json, in mm, mm³ and mm³/min. Rates are at the programmed feed; where the machine is slower
-//! than that, at corners and in short moves, they are lower.
+//! Enters: the path and what an engine that keeps the order of the program found for each of its moves: the
+//! z-map of upright tools, or voxels. Leaves: the figures of report.json, in mm, mm³ and mm³/min. Rates are
+//! at the programmed feed; where the machine is slower than that, at corners and in short moves, they are
+//! lower.
 
 use serde::Serialize;
 
@@ -14,7 +15,8 @@ use sim::{ENGAGED, MoveRemoval, RapidContact, Removal, VoxelRemoval};
 /// cells show that a steep cutter clears at a time; more smooth true peaks away.
 const STRETCH_CELLS: f64 = 4.0;
 
-/// Moves longer than so many stretches are held against the greatest section of what they cut: the mean over them may hide a peak.
+/// Moves longer than so many stretches are held against the greatest section of what they cut: the mean over
+/// them may hide a peak.
 const LONG: f64 = 4.0;
 
 /// Rapid moves that are listed, the first ones of the program.
@@ -33,7 +35,8 @@ pub struct RapidContactFigures {
     pub tool: Option<u32>,
     /// The cell that the cutter touched first, and the height of stock there; by voxels the voxel.
     pub at_mm: [f64; 3],
-    /// Greatest height that the move removed at a cell; by voxels at least how far below the surface that stood it cut.
+    /// Greatest height that the move removed at a cell; by voxels at least how far below the surface that
+    /// stood it cut.
     pub depth_mm: f64,
 }
 
@@ -54,17 +57,20 @@ pub struct RemovalFigures {
     pub max_material_removal_rate_mm3_min: f64,
     /// Bound of its error.
     pub max_material_removal_rate_error_bound_mm3_min: f64,
-    /// As far as cells see, the rate is nowhere greater, also in a part of a long move: held against the greatest width times the
-    /// greatest depth of what the move cuts, which may be much more than its section. Not by voxels.
+    /// As far as cells see, the rate is nowhere greater, also in a part of a long move: held against the
+    /// greatest width times the greatest depth of what the move cuts, which may be much more than its
+    /// section. Not by voxels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material_removal_rate_at_most_mm3_min: Option<f64>,
     /// The move that ends the stretch with the greatest rate, counted from 0.
     pub max_material_removal_rate_move: u32,
-    /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels. By
-    /// cells never too great: what stands between centres is not seen, and may be as high as the stock before the first cut.
+    /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of
+    /// cells or voxels. By cells never too great: what stands between centres is not seen, and may be as high
+    /// as the stock before the first cut.
     pub max_axial_engagement_mm: f64,
-    /// Bound of its error. By voxels slivers thinner than one are left out. By cells nothing is left out: no move meets stock higher
-    /// than from the lowest tip to the top of the stock before the first cut. Work in layers has a wide bound for that.
+    /// Bound of its error. By voxels slivers thinner than one are left out. By cells nothing is left out: no
+    /// move meets stock higher than from the lowest tip to the top of the stock before the first cut. Work in
+    /// layers has a wide bound for that.
     pub max_axial_engagement_error_bound_mm: f64,
     /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
     pub max_radial_engagement_mm: f64,
@@ -107,7 +113,8 @@ struct RemovalRecord<'a> {
 }
 
 impl RemovalRecord<'_> {
-    /// How much of a move cuts, mm: as far as what it cut reaches along it, and never less than a stretch; of a plunge what it is deep.
+    /// How much of a move cuts, mm: as far as what it cut reaches along it, and never less than a stretch; of
+    /// a plunge what it is deep.
     fn in_material(&self, removed: &MoveRemoval, way: Vector3, least: f64) -> f64 {
         let (length, in_plan) = (way.norm(), way.xy().norm());
         let reaches = match self.axial {
@@ -118,7 +125,8 @@ impl RemovalRecord<'_> {
         if removed.depth > ENGAGED { reaches.min(length) } else { length }
     }
 
-    /// By cells: no more is cut for a mm of the way, mm². Ahead it is a section, and below a cutter that goes down what it stands on.
+    /// By cells: no more is cut for a mm of the way, mm². Ahead it is a section, and below a cutter that goes
+    /// down what it stands on.
     fn greatest_section(&self, removed: &MoveRemoval, way: Vector3) -> f64 {
         let wide = removed.radial + removed.radial_bound;
         let down = (-way.z / way.norm()).max(0.0);
@@ -261,7 +269,8 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_
     }
 }
 
-/// What is left before a rapid move or the end belongs to the stretch that it goes on from, or is one of its own.
+/// What is left before a rapid move or the end belongs to the stretch that it goes on from, or is one of its
+/// own.
 fn rest(stretches: &mut Vec<Stretch>, rest: Stretch, goes_on: bool) {
     match stretches.last_mut().filter(|_| goes_on) {
         _ if rest.volume <= 0.0 => {}
@@ -291,7 +300,8 @@ mod tests {
         Move { to: ClPoint::upright(Point3::new(x, y, z)), kind, feed_rate: 600.0, pass: 0 }
     }
 
-    /// A block of 40 × 20 mm whose top is [`TOP`]; no centre of a cell lies within 0.025 mm of a multiple of 0.05 mm.
+    /// A block of 40 × 20 mm whose top is [`TOP`]; no centre of a cell lies within 0.025 mm of a multiple of
+    /// 0.05 mm.
     fn cut_from_block(cutter: &Cutter, path: &Toolpath) -> RemovalFigures {
         let grid = Grid { origin: Point2::new(0.025, 0.025), cell: 0.05, nx: 800, ny: 400 };
         let removal = cut_in_order(ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
@@ -428,7 +438,8 @@ mod tests {
         assert!((layers.max_axial_engagement_error_bound_mm - 2.0).abs() < 1e-6, "{layers:?}");
     }
 
-    /// The lowest tip in the full block is met up to its top; centres beside it miss what the wave rises until there.
+    /// The lowest tip in the full block is met up to its top; centres beside it miss what the wave rises
+    /// until there.
     #[test]
     fn axial_engagement_of_a_ball_in_a_wave() {
         let wave = |x: f64| -1.0 - 0.4 * (x / 2.0).sin();

@@ -1,4 +1,5 @@
-//! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is corrected by.
+//! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is
+//! corrected by.
 
 use super::coverage::STEEP;
 use super::cut_surface::CutSurface;
@@ -19,8 +20,8 @@ const MOST_ASKED: usize = 256;
 /// All ridges of a cut surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RidgeMap {
-    /// Places near the scallop limit and above it, where a ridge crosses from a cell to the next; above it, sides of cells along
-    /// the borders.
+    /// Places near the scallop limit and above it, where a ridge crosses from a cell to the next; above it,
+    /// sides of cells along the borders.
     pub above: Vec<RidgePlace>,
     /// The highest remnant along a border, mm.
     pub border: f64,
@@ -30,8 +31,9 @@ pub struct RidgeMap {
     pub is_close: bool,
 }
 
-/// The ridges of `cut`, the stock after `path`; the highest is looked at closer until its bound is `asked` mm, if it comes
-/// down to that. `None` where cells are too coarse for it: moves that none of them saw cut all high places away.
+/// The ridges of `cut`, the stock after `path`; the highest is looked at closer until its bound is `asked`
+/// mm, if it comes down to that. `None` where cells are too coarse for it: moves that none of them saw cut
+/// all high places away.
 pub(super) fn ridge_map(
     part: &Part,
     cutters: &Cutters,
@@ -77,9 +79,9 @@ pub(super) fn ridge_map(
     Ok(Some(RidgeMap { above, border, scallop, is_close: true }))
 }
 
-/// What stands above the scallop limit, or would by the last decimals of a program, also between the places that a map of ridges holds: one
-/// place of each cell that a ridge near the limit crosses, or that lies along a border, with the height that it may have at most.
-/// `stock_top` is the height of the stock's flat top, mm.
+/// What stands above the scallop limit, or would by the last decimals of a program, also between the places
+/// that a map of ridges holds: one place of each cell that a ridge near the limit crosses, or that lies along
+/// a border, with the height that it may have at most. `stock_top` is the height of the stock's flat top, mm.
 pub(super) fn places_above(
     part: &Part,
     cutters: &Cutters,
@@ -157,8 +159,8 @@ struct Top {
     at: Point3,
 }
 
-/// Gives the highest places, and the others above the limit, the heights that all moves left there: some pass between coarse
-/// cells and no cell saw them. False where none is as high as it was found to be.
+/// Gives the highest places, and the others above the limit, the heights that all moves left there: some pass
+/// between coarse cells and no cell saw them. False where none is as high as it was found to be.
 fn as_left(tops: &mut [Top], inspection: &Inspection<'_>, all: &[u32]) -> bool {
     let Inspection { part, limits, asked, surface, .. } = *inspection;
     tops.sort_by(|a, b| b.place.height.total_cmp(&a.place.height));
@@ -181,8 +183,8 @@ fn as_left(tops: &mut [Top], inspection: &Inspection<'_>, all: &[u32]) -> bool {
     is_seen
 }
 
-/// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no
-/// remnant of a pass.
+/// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut
+/// tolerance is no remnant of a pass.
 pub(super) fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
     let Inspection { grid, limits, .. } = *inspection;
     let of_row = |j: usize| {
@@ -266,7 +268,8 @@ mod tests {
         assert!((at(0.0) - sagitta(0.2)).abs() < 1e-4, "{} {}", at(0.0), sagitta(0.2));
     }
 
-    /// Two passes lie farthest from each other where a third one comes down between them, so little that no cell sees it.
+    /// Two passes lie farthest from each other where a third one comes down between them, so little that no
+    /// cell sees it.
     #[test]
     fn what_no_cell_saw_lowers_the_highest_places() {
         let (part, ball) = (plane([4.0, 3.0]), Cutter::ball(6.0).unwrap());

@@ -1,18 +1,17 @@
 //! Scallop ridges: where the cuts of two passes meet.
 //!
-//! Wherever two neighbouring cells were cut by different passes, a ridge runs between them. On the
-//! line from one cell centre to the other the closed-form cuts of the two are brought to
-//! intersection, so the height found there is that of the ridge itself and not of the highest cell
-//! (which misses up to `s·p/(4√(r² − s²/4))`). Moves that are lowest only between the centres are
-//! found on the way. Heights are distances from the design surface.
+//! Wherever two neighbouring cells were cut by different passes, a ridge runs between them. On the line from
+//! one cell centre to the other the closed-form cuts of the two are brought to intersection, so the height
+//! found there is that of the ridge itself and not of the highest cell (which misses up to
+//! `s·p/(4√(r² − s²/4))`). Moves that are lowest only between the centres are found on the way. Heights are
+//! distances from the design surface.
 //!
-//! A ridge that crosses a grid line counts for the length that it runs between grid lines: for a
-//! crossing of a line along x, pitch times `|n_x|`, `n` the ridge's plan normal (the sum over both
-//! families of lines gives the length of any curve: `ds = |n_x||dy| + |n_y||dx|`), stretched by its
-//! rise.
+//! A ridge that crosses a grid line counts for the length that it runs between grid lines: for a crossing of
+//! a line along x, pitch times `|n_x|`, `n` the ridge's plan normal (the sum over both families of lines
+//! gives the length of any curve: `ds = |n_x||dy| + |n_y||dx|`), stretched by its rise.
 //!
-//! What stands aside of a border's normal, on the side where the part has ended, stands over no place of the part: it is no
-//! ridge of it, though the part may lie below.
+//! What stands aside of a border's normal, on the side where the part has ended, stands over no place of the
+//! part: it is no ridge of it, though the part may lie below.
 
 use super::cut_surface::CutSurface;
 use super::every_move::EveryMove;
@@ -46,7 +45,8 @@ pub(super) struct RidgeSample {
 }
 
 impl RidgeSample {
-    /// True when the ridge may stand higher than `highest` before the next grid line that it crosses squarely.
+    /// True when the ridge may stand higher than `highest` before the next grid line that it crosses
+    /// squarely.
     fn might_rise_above(&self, highest: f64) -> bool {
         self.squareness >= SQUARE_ENOUGH && self.height + self.rise > highest + NUMERICAL_FLOOR
     }
@@ -114,9 +114,10 @@ pub(super) struct Highest {
     pub possible: f64,
 }
 
-/// Where a ridge could rise above the highest sample between two grid lines, it is looked at on this
-/// many lines between them, and on so many more between two of these where it still could, by more than the asked bound, up to
-/// [`MOST_LINES`] in all. More lines at once, or at most, take longer; fewer at most leave steep ridges open.
+/// Where a ridge could rise above the highest sample between two grid lines, it is looked at on this many
+/// lines between them, and on so many more between two of these where it still could, by more than the asked
+/// bound, up to [`MOST_LINES`] in all. More lines at once, or at most, take longer; fewer at most leave steep
+/// ridges open.
 const CLOSER_LINES: i32 = 8;
 const MOST_LINES: i32 = 512;
 
@@ -227,7 +228,8 @@ impl<'a> RidgeFinder<'a> {
         Ok(ridges)
     }
 
-    /// The samples by the passes that meet; those on every so many lines of either family are to be calculated too.
+    /// The samples by the passes that meet; those on every so many lines of either family are to be
+    /// calculated too.
     fn pairs(&self, samples: &[RidgeSample]) -> PairTally {
         let grid = &self.surface.cut.grid;
         let one_in = PairTally::one_in(self.cutters.first(), grid.cell);
@@ -316,7 +318,8 @@ impl<'a> RidgeFinder<'a> {
         self.every_move.is_some_and(|every_move| every_move.cuts_away(&below).is_some())
     }
 
-    /// Whether the cut lies between a foot and a ridge: what stands so high stands on other places of the design.
+    /// Whether the cut lies between a foot and a ridge: what stands so high stands on other places of the
+    /// design.
     fn leans_over(&self, foot: &Point3, ridge: &Point3) -> bool {
         let way = ridge - foot;
         let out = self.surface.along_normal(foot, &way.normalize());
@@ -380,8 +383,8 @@ impl<'a> RidgeFinder<'a> {
         Ok(Some(highest))
     }
 
-    /// The ridge of a sample `aside` of its line, by a share of it, on lines that are such a share of it apart; up to half a cell on either
-    /// side, or to where others are looked at.
+    /// The ridge of a sample `aside` of its line, by a share of it, on lines that are such a share of it
+    /// apart; up to half a cell on either side, or to where others are looked at.
     fn closer(&self, (aside, sample): &(f64, RidgeSample), lines: i32) -> Vec<(f64, RidgeSample)> {
         let line = GridLine::new(&self.surface.cut.grid, sample.from.0, sample.from.1);
         let [a, b] = sample.moves;

@@ -1,18 +1,19 @@
 //! Roughness of the cut surface across the feed: Ra and Rz of profiles of the deviation.
 //!
-//! Enters: the part, an engine that tells of the cut along normals, and the path. Leaves: Ra and Rz, mm, over profiles
-//! spread over the part, with a bound of the error of their evaluation.
+//! Enters: the part, an engine that tells of the cut along normals, and the path. Leaves: Ra and Rz, mm, over
+//! profiles spread over the part, with a bound of the error of their evaluation.
 //!
-//! A profile runs from a place of the part across the feed of the move that cut there, straight on the design surface: each
-//! step goes along the tangent, back to the nearest point, and on in the same direction. Its height is the deviation along
-//! the design's normal, so that the part's own shape is no roughness. Ridges, where the cut changes from one track to
-//! the next, are found by halving and end the path intervals. A sampling length (cut-off) is a whole number of path intervals,
-//! [`MOST_INTERVALS`] where the surface is wide enough; the mean line of each is its mean height. Ra is the mean of |height
-//! − mean line| and Rz the greatest less the least height, each the mean of five sampling lengths in a row, as ISO 4287 (now ISO
+//! A profile runs from a place of the part across the feed of the move that cut there, straight on the design
+//! surface: each step goes along the tangent, back to the nearest point, and on in the same direction. Its
+//! height is the deviation along the design's normal, so that the part's own shape is no roughness. Ridges,
+//! where the cut changes from one track to the next, are found by halving and end the path intervals. A
+//! sampling length (cut-off) is a whole number of path intervals, [`MOST_INTERVALS`] where the surface is
+//! wide enough; the mean line of each is its mean height. Ra is the mean of |height − mean line| and Rz the
+//! greatest less the least height, each the mean of five sampling lengths in a row, as ISO 4287 (now ISO
 //! 21920-2) has it. Lengths of several intervals leave heights that differ from pass to pass in the figures.
 //!
-//! Profiles are read by rays along the normals, whatever engine cut. Ridges end the intervals, so that sampling lengths hold
-//! whole intervals and no filter is needed.
+//! Profiles are read by rays along the normals, whatever engine cut. Ridges end the intervals, so that
+//! sampling lengths hold whole intervals and no filter is needed.
 //!
 //! Closed forms: a parabola of height h has Ra = 4h/(9√3) and Rz = h.
 
@@ -51,7 +52,8 @@ const MOST_DEPTH: usize = 4;
 const SAMPLES: usize = 24;
 const FINER: usize = 8;
 
-/// Neighbouring normals of one profile differ by less than this, as a cosine (30°): elsewhere is an edge of the part.
+/// Neighbouring normals of one profile differ by less than this, as a cosine (30°): elsewhere is an edge of
+/// the part.
 const CREASE: f64 = 0.866;
 
 /// Roughness across the feed.
@@ -67,7 +69,8 @@ pub struct RoughnessFigures {
     pub rz_max_mm: Option<f64>,
     /// Where the profile with the greatest Rz was begun.
     pub rz_max_at_mm: Option<[f64; 3]>,
-    /// Bound of the error with which the means were evaluated. How profiles differ over the part is not in it.
+    /// Bound of the error with which the means were evaluated. How profiles differ over the part is not in
+    /// it.
     pub error_bound_mm: Option<f64>,
     /// The same of the greatest of the profiles' figures.
     pub max_error_bound_mm: Option<f64>,
@@ -84,9 +87,9 @@ pub struct RoughnessFigures {
     pub reason: Option<String>,
 }
 
-/// The roughness across the feed of what `engine` tells of the cut by `path`; cuts as deep as it looks, or deeper, count for
-/// nothing. `interval` is about how far passes are apart,
-/// mm: the measured area over the cutting length.
+/// The roughness across the feed of what `engine` tells of the cut by `path`; cuts as deep as it looks, or
+/// deeper, count for nothing. `interval` is about how far passes are apart, mm: the measured area over the
+/// cutting length.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -371,7 +374,8 @@ struct Heights {
 }
 
 impl Heights {
-    /// One interval: heights at even steps, and its length. Between samples runs the parabola through three of them.
+    /// One interval: heights at even steps, and its length. Between samples runs the parabola through three
+    /// of them.
     fn add(&mut self, samples: &[f64], length: f64) {
         let last = samples.len() - 1;
         let piece = length / (last * FINER) as f64;
@@ -384,7 +388,8 @@ impl Heights {
             };
             self.pieces.extend((0..FINER).map(|n| [piece, at(n), at(n + 1)]));
             let bow = (a - 2.0 * b + c).abs() / (8.0 * (FINER * FINER) as f64);
-            // A parabola through three places misses a third difference by a share of 1/(9√3), or a fifth in the end steps.
+            // A parabola through three places misses a third difference by a share of 1/(9√3), or a fifth in
+            // the end steps.
             let third = if k >= 1 && k + 2 <= last {
                 (samples[k + 2] - 3.0 * samples[k + 1] + 3.0 * samples[k] - samples[k - 1]).abs()
             } else {

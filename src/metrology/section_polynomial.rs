@@ -1,14 +1,16 @@
-//! Scallops between passes of constant parameter by a polynomial section, as patented in 2021 (fourth source of `scenes/sources`): a second
-//! opinion that knows the design by the contacts of its passes alone.
+//! Scallops between passes of constant parameter by a polynomial section, as patented in 2021 (fourth source
+//! of `scenes/sources`): a second opinion that knows the design by the contacts of its passes alone.
 //!
-//! Enters: a part of patches, a ball, a finished path. Leaves: heights, mm, by its steps. S1: the part is a patch F(u, v). S2: a line across the
-//! passes is sampled where these cross it. S3: the plane across the feed stands at the first contact, and the neighbours are projected into it.
-//! S4, S5: in that plane a polynomial goes through them by least squares. S6: two circles stand around the centres of the
-//! ball, their meeting's distance from the polynomial is the height; and so on along all passes.
+//! Enters: a part of patches, a ball, a finished path. Leaves: heights, mm, by its steps. S1: the part is a
+//! patch F(u, v). S2: a line across the passes is sampled where these cross it. S3: the plane across the feed
+//! stands at the first contact, and the neighbours are projected into it. S4, S5: in that plane a polynomial
+//! goes through them by least squares. S6: two circles stand around the centres of the ball, their meeting's
+//! distance from the polynomial is the height; and so on along all passes.
 //!
-//! Mended: the centre is the contact plus the radius times the normal, which the patent takes along the axis of the tool. As published it
-//! is exact where passes are parallel and the part bends across them only. Where they spread, or the part bends along them too,
-//! neighbours lie before or behind the plane, and heights are off by that ([`crate::PairFigures`] are not).
+//! Mended: the centre is the contact plus the radius times the normal, which the patent takes along the axis
+//! of the tool. As published it is exact where passes are parallel and the part bends across them only. Where
+//! they spread, or the part bends along them too, neighbours lie before or behind the plane, and heights are
+//! off by that ([`crate::PairFigures`] are not).
 //!
 //! Which passes lie on lines of constant parameter is found from their contacts, so that any path is asked.
 
@@ -27,9 +29,10 @@ use crate::PairFigures;
 /// Contacts by which the line of a pass is found, evenly along it.
 const CONTACTS: usize = 64;
 
-/// A contact is off its line by no more than this share of the distance to the next line: between the locations of a pass the ball
-/// leaves it a little. A height grows with the square of the interval, so that both passes together change it by a fifth at most. Passes
-/// that lie on no such line leave it by as much as they are apart.
+/// A contact is off its line by no more than this share of the distance to the next line: between the
+/// locations of a pass the ball leaves it a little. A height grows with the square of the interval, so that
+/// both passes together change it by a fifth at most. Passes that lie on no such line leave it by as much as
+/// they are apart.
 const OFF_LINE: f64 = 0.05;
 
 /// A ball's centre stands over its contact within this share of the distance; beside a border it does not.
@@ -44,7 +47,8 @@ const BESIDE: usize = 2;
 /// Share of the passes that must lie on lines of constant parameter; the rest are short ones along borders.
 const MOSTLY: f64 = 0.9;
 
-/// A pair counts where at least this share of its ridge was measured: others have cut away most of the rest, if not all of it.
+/// A pair counts where at least this share of its ridge was measured: others have cut away most of the rest,
+/// if not all of it.
 const LEFT: f64 = 0.5;
 
 /// Heights by polynomial sections.
@@ -82,7 +86,8 @@ struct Line {
 }
 
 impl Line {
-    /// Whether its contacts are near it, measured by the distance of the next one beside it; a line that is gone along twice is one.
+    /// Whether its contacts are near it, measured by the distance of the next one beside it; a line that is
+    /// gone along twice is one.
     fn is_apart(&self, all: &[Self]) -> bool {
         let is_beside = |other: &&Self| {
             (other.patch, other.constant) == (self.patch, self.constant)
@@ -117,8 +122,9 @@ struct Sum {
     max: f64,
 }
 
-/// Heights between the passes of a path, where a ridge of theirs was measured, beside those measured; `None` where passes are no lines of
-/// constant parameter, the cutter is no ball, or no two passes lie beside each other.
+/// Heights between the passes of a path, where a ridge of theirs was measured, beside those measured; `None`
+/// where passes are no lines of constant parameter, the cutter is no ball, or no two passes lie beside each
+/// other.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -227,7 +233,8 @@ fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> Option<PatchPoint> {
     foot.at.filter(|_| up.dot(&foot.normal) >= (1.0 - UPRIGHT) * up.norm())
 }
 
-/// The two lines of constant parameter that the contacts of a pass may lie on, near or far; `None` where they are on several patches.
+/// The two lines of constant parameter that the contacts of a pass may lie on, near or far; `None` where they
+/// are on several patches.
 fn candidates(pass: u32, contacts: &[PatchPoint]) -> Option<[Line; 2]> {
     let first = contacts.first()?;
     if contacts.len() < 2 || contacts.iter().any(|at| at.patch != first.patch) {
@@ -374,14 +381,16 @@ mod tests {
         (0..12).flat_map(|k| pieces(4.0 + step * f64::from(k))).collect()
     }
 
-    /// Heights on a plane have a closed form, whatever the distance of passes; passes askew lie on no lines of the patch.
+    /// Heights on a plane have a closed form, whatever the distance of passes; passes askew lie on no lines
+    /// of the patch.
     #[test]
     fn lines_are_told_by_their_distance_from_each_other() {
         for step in [0.02, 0.2, 0.8] {
             let found = figures(&passes(step, 0.0)).unwrap();
             let exact = 3.0 - (9.0 - 0.25 * step * step).sqrt();
             assert!((found.mean_mm / exact - 1.0).abs() < 1e-3, "{step}: {} {exact}", found.mean_mm);
-            // As far as they stray by a hundredth of their distance they are still lines; by half of it no longer.
+            // As far as they stray by a hundredth of their distance they are still lines; by half of it no
+            // longer.
             assert!(figures(&passes(step, 0.001 * step)).is_some(), "{step}");
             assert!(figures(&passes(step, 0.05 * step)).is_none(), "{step}");
         }

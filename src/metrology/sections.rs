@@ -1,8 +1,8 @@
 //! Deviation of the cut surface at the sections of a blade.
 //!
-//! Enters: deviations at an even net of places over the blade's patches. Leaves: least, greatest and mean deviation along each
-//! section, of all patches. Read from the row of places nearest to the section, which lies off it by no more than half the
-//! distance of two rows; nothing is measured anew.
+//! Enters: deviations at an even net of places over the blade's patches. Leaves: least, greatest and mean
+//! deviation along each section, of all patches. Read from the row of places nearest to the section, which
+//! lies off it by no more than half the distance of two rows; nothing is measured anew.
 
 use serde::Serialize;
 
@@ -25,8 +25,8 @@ pub struct SectionFigures {
     pub row_off_mm: f64,
 }
 
-/// Deviation at sections of these heights, mm, which lie at `parameters[patch][section]` of v on the patches of the map.
-/// Sections at which nothing was measured are left out.
+/// Deviation at sections of these heights, mm, which lie at `parameters[patch][section]` of v on the patches
+/// of the map. Sections at which nothing was measured are left out.
 pub fn section_figures(map: &NormalMap, heights: &[f64], parameters: &[&[f64]]) -> Vec<SectionFigures> {
     let of = |(section, &height_mm): (usize, &f64)| {
         let mut row_off_mm = 0.0f64;
@@ -59,7 +59,8 @@ mod tests {
 
     #[test]
     fn each_section_takes_the_rows_nearest_to_it_of_all_patches() {
-        // Two patches of 4 × 5 and 4 × 11 places, deviations as their row's share of v, a hundredth more on the second.
+        // Two patches of 4 × 5 and 4 × 11 places, deviations as their row's share of v, a hundredth more on
+        // the second.
         let grid = |first, rows| PatchGrid {
             first,
             counts: [4, rows],

@@ -1,4 +1,5 @@
-//! Tests: several cutters that make one part, against closed forms, brute force and the other engine on cells.
+//! Tests: several cutters that make one part, against closed forms, brute force and the other engine on
+//! cells.
 
 use crate::figures::Limits;
 use crate::flat_scene::plane;
@@ -81,7 +82,8 @@ fn ball() -> Cutter {
     Cutter::ball(6.0).unwrap()
 }
 
-/// A flat leaves 0.03 mm everywhere, and passes of a ball that are 2 mm apart would leave more: the lower of both stands.
+/// A flat leaves 0.03 mm everywhere, and passes of a ball that are 2 mm apart would leave more: the lower of
+/// both stands.
 #[test]
 fn the_highest_material_is_the_lower_of_both_cutters() {
     let (part, finish) = (plane(SIZE), level(0.0, [-1.0, 9.0], 2.0));

@@ -9,8 +9,8 @@ use motion::{Cutters, MoveKind, Toolpath};
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
 const SAME_TRACK: f64 = 4.0;
 
-/// Moves of one pass feed in opposite directions where the cosine between them is less, and aside of each other where they are
-/// this share of the cutter's radius apart: the way back beside the way there.
+/// Moves of one pass feed in opposite directions where the cosine between them is less, and aside of each
+/// other where they are this share of the cutter's radius apart: the way back beside the way there.
 const OPPOSITE: f64 = -0.5;
 const ASIDE: f64 = 1e-3;
 
@@ -65,8 +65,8 @@ impl<'a> Tracks<'a> {
         [x.min(y), x.max(y)]
     }
 
-    /// True when two moves belong to neighbouring tracks. A pass that feeds back beside its way there has two, however short
-    /// they are.
+    /// True when two moves belong to neighbouring tracks. A pass that feeds back beside its way there has
+    /// two, however short they are.
     pub fn apart(&self, a: u32, b: u32) -> bool {
         let [x, y] = [a, b].map(|k| &self.path.moves[k as usize]);
         let linked = x.kind == MoveKind::Link || y.kind == MoveKind::Link;

@@ -1,7 +1,8 @@
 //! How fast the axis of a tool turns along its passes, and from pass to pass.
 //!
-//! Enters: the part, the cutter, the path. Leaves: the greatest turn of a cutting move over the way of its contact on the
-//! part, and the greatest one between a contact and the nearest of a pass beside it over their distance, rad a mm.
+//! Enters: the part, the cutter, the path. Leaves: the greatest turn of a cutting move over the way of its
+//! contact on the part, and the greatest one between a contact and the nearest of a pass beside it over their
+//! distance, rad a mm.
 
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
@@ -52,8 +53,9 @@ pub fn fastest_turn(
     Ok(turns.into_iter().flatten().max_by(|a, b| a.rate.total_cmp(&b.rate)))
 }
 
-/// The fastest turn from pass to pass: between the end of a cutting move and the nearest place of each pass beside it.
-/// Beside it are the passes up to twice as far off as the nearest, within a cutter's diameter. `None` where no axis turns.
+/// The fastest turn from pass to pass: between the end of a cutting move and the nearest place of each pass
+/// beside it. Beside it are the passes up to twice as far off as the nearest, within a cutter's diameter.
+/// `None` where no axis turns.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -147,7 +149,8 @@ mod tests {
             assert_eq!(fastest_turn(&part, &cutter, &upright, &Silent).unwrap(), None);
         }
     }
-    /// Passes on a plate, each leaning more than the last: rates in closed form, and none where one pass stands alone.
+    /// Passes on a plate, each leaning more than the last: rates in closed form, and none where one pass
+    /// stands alone.
     #[test]
     fn turns_from_pass_to_pass_are_told_by_the_distance_of_contacts() {
         let corners =

@@ -1,7 +1,8 @@
-//! Dips that no cell centre shows, because they are narrow or another move cut there: where the cutter itself stands in the design.
+//! Dips that no cell centre shows, because they are narrow or another move cut there: where the cutter itself
+//! stands in the design.
 //!
-//! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep a dip between centres may be at most, and the places
-//! of moves that stand deeper in the design than what the cells saw. mm.
+//! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep a dip between centres may be at
+//! most, and the places of moves that stand deeper in the design than what the cells saw. mm.
 
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
@@ -21,8 +22,8 @@ const CLOSER_STEPS: usize = 8;
 /// How often steps are divided at most. Four times bring a step of 0.1 mm to 25 nm.
 const MOST_LOOKS: usize = 4;
 
-/// From the design's normal below the tip to that at the contact in so many steps at most: each leaves a share of the error that is the
-/// curvature of the design over that of the cutter.
+/// From the design's normal below the tip to that at the contact in so many steps at most: each leaves a
+/// share of the error that is the curvature of the design over that of the cutter.
 const CONTACT_STEPS: usize = 12;
 
 /// Nearer normals are the same: what the cutter stands deeper by is the radius times half the square.
@@ -31,8 +32,9 @@ const SAME_NORMAL: f64 = 1e-4;
 /// A contact counts when it lies beside its foot along the normal to this share: not beyond the border.
 const BESIDE: f64 = 0.1;
 
-/// How deep the cutter may dip into a level surface between centres `cell` mm apart and none of them be in the
-/// dip: w²/8r for a corner of radius r, w the diagonal of a cell. Edges and points may be as deep as half of w.
+/// How deep the cutter may dip into a level surface between centres `cell` mm apart and none of them be in
+/// the dip: w²/8r for a corner of radius r, w the diagonal of a cell. Edges and points may be as deep as half
+/// of w.
 fn unseen_depth(cutter: &Cutter, cell: f64) -> f64 {
     let (width, corner) = (cell * std::f64::consts::SQRT_2, cutter.corner_radius());
     let rounded = corner > 0.0 && cutter.profile().is_plain();
@@ -58,8 +60,8 @@ pub(super) struct Dip {
     pub by: u32,
 }
 
-/// The places on moves, `pitch` mm apart, where the cutter may stand deeper in the design than `known` mm, the deepest of each. The moves are
-/// given by their indices, rising.
+/// The places on moves, `pitch` mm apart, where the cutter may stand deeper in the design than `known` mm,
+/// the deepest of each. The moves are given by their indices, rising.
 pub(super) fn dips(
     part: &Part,
     cutters: &Cutters,
@@ -116,8 +118,8 @@ struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
-    /// The places that may be deeper than `known` mm, of those `steps` apart. Where the cutter may stand deeper between two of them than
-    /// at either, the places between are looked at, `looks` times over.
+    /// The places that may be deeper than `known` mm, of those `steps` apart. Where the cutter may stand
+    /// deeper between two of them than at either, the places between are looked at, `looks` times over.
     fn dips(&self, steps: usize, known: f64, looks: usize) -> Vec<Dip> {
         let Self { at, length, shares: [from, to], ends } = *self;
         let share = |k: usize| from + (to - from) * (k as f64 / steps as f64);
@@ -145,10 +147,10 @@ impl Stretch<'_> {
 
 /// How deep the cutter stands at most between a place and the one before, mm.
 ///
-/// A kink of the depth between two places shows in the second differences around: in those at both places together in full,
-/// and it rises above the chord by no more than a quarter of that. At the end of a move only one of them is known, and it
-/// rises by no more than that. What bends evenly rises by less. A rigid cutter rises by no more than half of its way `step`, mm,
-/// whatever it touches.
+/// A kink of the depth between two places shows in the second differences around: in those at both places
+/// together in full, and it rises above the chord by no more than a quarter of that. At the end of a move
+/// only one of them is known, and it rises by no more than that. What bends evenly rises by less. A rigid
+/// cutter rises by no more than half of its way `step`, mm, whatever it touches.
 fn before(along: &[Option<Dip>], k: usize, step: f64) -> f64 {
     let depth = |k: Option<usize>| along.get(k?).copied().flatten().map(|dip| dip.depth);
     let (Some(here), Some(last)) = (depth(Some(k)), depth(k.checked_sub(1))) else {
@@ -218,7 +220,8 @@ mod tests {
         assert!(dips(&part, &cutter.into(), &path, &all, 0.1, 0.4, &Silent).unwrap().is_empty());
     }
 
-    /// Depths along a move that plunges to just the surface, and of one that passes over a crest between two places.
+    /// Depths along a move that plunges to just the surface, and of one that passes over a crest between two
+    /// places.
     #[test]
     fn a_straight_plunge_is_no_deeper_than_its_end_and_a_kink_no_higher_than_told() {
         let dips = |depths: &dyn Fn(f64) -> f64| -> Vec<Option<Dip>> {

@@ -1,18 +1,20 @@
 //! What a path leaves standing on the walls of a pocket.
 //!
-//! Enters: stretches of walls that the cutter comes to, the moves, and where nothing stood before. Leaves: how thick material stands on a
-//! wall at most, along its normal, and a bound; mm.
+//! Enters: stretches of walls that the cutter comes to, the moves, and where nothing stood before. Leaves:
+//! how thick material stands on a wall at most, along its normal, and a bound; mm.
 //!
-//! In the plan view a straight move sweeps a stadium, which is convex. So what a stadium holds on the normals at both ends of a stretch
-//! it holds between them, and the thickness left of both ends together bounds that of the stretch. At a place itself the stadiums
-//! tell exactly. Stretches are halved until the bound is near the thickest place that was found.
+//! In the plan view a straight move sweeps a stadium, which is convex. So what a stadium holds on the normals
+//! at both ends of a stretch it holds between them, and the thickness left of both ends together bounds that
+//! of the stretch. At a place itself the stadiums tell exactly. Stretches are halved until the bound is near
+//! the thickest place that was found.
 
 use geometry::{CurveSegment, Point2, RegionIndex, SegmentGrid, Vector2, WallStretch};
 use motion::Toolpath;
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
-/// Stretches that are looked at first are no longer than this share of the radius, and turn by no more than so many rad.
+/// Stretches that are looked at first are no longer than this share of the radius, and turn by no more than
+/// so many rad.
 const FIRST: f64 = 0.1;
 
 /// A bound that exceeds the thickest material by no more is good enough, mm.
@@ -29,7 +31,8 @@ const BESIDE: f64 = 1.0e-9;
 pub struct WallMaterial {
     /// How thick it stands at most, mm; as far as was looked where no move comes near.
     pub thickness: f64,
-    /// How much thicker it may be between the places that were looked at, mm; infinite where no move comes near.
+    /// How much thicker it may be between the places that were looked at, mm; infinite where no move comes
+    /// near.
     pub error_bound: f64,
     /// Where, if it stands anywhere.
     pub at: Option<Point2>,

@@ -33,8 +33,8 @@ impl PassStretches {
         Self { stretches, tree }
     }
 
-    /// The passes beside a place `p` (mm) of the pass `own`: up to twice as far off as the nearest, and no farther than
-    /// `within` mm.
+    /// The passes beside a place `p` (mm) of the pass `own`: up to twice as far off as the nearest, and no
+    /// farther than `within` mm.
     pub fn beside(&self, p: &Point3, own: u32, within: f64) -> Vec<Beside> {
         let mut found: Vec<Beside> = Vec::new();
         let Some((tree, slots)) = &self.tree else {

@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use crate::Toolpath;
 use cutter::Cutter;
 
-/// The cutters of a path, in the order in which they come: each makes the moves from its first one on, up to that of the next.
+/// The cutters of a path, in the order in which they come: each makes the moves from its first one on, up to
+/// that of the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cutters {
     /// The first move, and what cuts from there; the first one's is 0.
@@ -49,8 +50,8 @@ impl Cutters {
         self
     }
 
-    /// The cutters of another path behind this one: the first from the move `begin` on, the others counted from `first`.
-    /// A cutter that goes on is the same one.
+    /// The cutters of another path behind this one: the first from the move `begin` on, the others counted
+    /// from `first`. A cutter that goes on is the same one.
     #[must_use]
     pub fn and_then(mut self, begin: u32, first: u32, next: &Self) -> Self {
         for (k, (move_index, cutter)) in next.of.iter().enumerate() {

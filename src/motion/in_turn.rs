@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::{Move, MoveKind, Toolpath};
 
-/// Paths that run one after the other. Between two of them the tool is away: it rises above all of the path, and the next one
-/// comes from there. How the machine does that is not known, and counts as an approach.
+/// Paths that run one after the other. Between two of them the tool is away: it rises above all of the path,
+/// and the next one comes from there. How the machine does that is not known, and counts as an approach.
 #[derive(Debug, Clone)]
 pub struct PathsInTurn {
     path: Toolpath,
@@ -20,8 +20,8 @@ impl PathsInTurn {
         Self { top: highest(&path), passes: passes(&path), path }
     }
 
-    /// Adds a path, with rapids at a feed of `rapid_rate` mm/min; tells the index of its first move. The two rapids before
-    /// that are its own, too.
+    /// Adds a path, with rapids at a feed of `rapid_rate` mm/min; tells the index of its first move. The two
+    /// rapids before that are its own, too.
     pub fn push(&mut self, next: Toolpath, rapid_rate: f64) -> u32 {
         let (path, pass) = (&mut self.path, self.passes);
         self.top = self.top.max(highest(&next));

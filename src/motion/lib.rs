@@ -1,10 +1,11 @@
 //! Where a cutter is and how it moves: contacts, locations, tool axes, moves, paths.
 //!
-//! Enters: contacts with unit normals, or tip positions with axes. Leaves: a [`Toolpath`] of moves. What cuts, measures or
-//! drives a machine depends on these types; none of them knows how a path was planned.
+//! Enters: contacts with unit normals, or tip positions with axes. Leaves: a [`Toolpath`] of moves. What
+//! cuts, measures or drives a machine depends on these types; none of them knows how a path was planned.
 //!
-//! Lengths in mm, feed in mm/min, tilt in rad. A location is that of the tip; an axis is a unit vector from the tip to the
-//! holder. A [`Toolpath`] holds whatever it was made of: what cuts and measures checks it first ([`Toolpath::check`]).
+//! Lengths in mm, feed in mm/min, tilt in rad. A location is that of the tip; an axis is a unit vector from
+//! the tip to the holder. A [`Toolpath`] holds whatever it was made of: what cuts and measures checks it
+//! first ([`Toolpath::check`]).
 
 mod beside;
 mod checked;

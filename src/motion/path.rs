@@ -96,10 +96,11 @@ pub struct Origin {
     pub pieces: Vec<Range<u32>>,
     /// Moves before which the machine comes to rest, in order.
     pub stops: Vec<u32>,
-    /// Moves whose beginning no program tells, in order: they come from where the machine stood before, or from the change of a
-    /// tool. They count neither as time nor as way.
+    /// Moves whose beginning no program tells, in order: they come from where the machine stood before, or
+    /// from the change of a tool. They count neither as time nor as way.
     pub approaches: Vec<Range<u32>>,
-    /// How far the tool's axis may be off theirs, rad, which `strays` has for the cutter alone: what stands higher is farther off.
+    /// How far the tool's axis may be off theirs, rad, which `strays` has for the cutter alone: what stands
+    /// higher is farther off.
     pub leans: f64,
 }
 
@@ -115,8 +116,8 @@ pub struct Toolpath {
 }
 
 impl Toolpath {
-    /// Moves that stand in no program yet. They are taken as they are: [`Toolpath::check`] tells whether they can be cut, and
-    /// functions that cut or measure return its error.
+    /// Moves that stand in no program yet. They are taken as they are: [`Toolpath::check`] tells whether they
+    /// can be cut, and functions that cut or measure return its error.
     pub fn new(start: ClPoint, moves: Vec<Move>) -> Self {
         Self { start, moves, origin: Origin::default() }
     }

@@ -15,8 +15,8 @@ const ALONG: f64 = 1e-9;
 pub enum ToolAxis {
     /// The same unit vector everywhere.
     Fixed(Vector3),
-    /// Leaning from the normal of the surface: by `lead` forward in feed direction (a flat then cuts with its toe and lifts
-    /// its heel), by `tilt` to the left of it, rad.
+    /// Leaning from the normal of the surface: by `lead` forward in feed direction (a flat then cuts with its
+    /// toe and lifts its heel), by `tilt` to the left of it, rad.
     LeadTilt {
         /// Forward, rad.
         lead: f64,

@@ -18,7 +18,8 @@ pub fn in_last_decimals(value: f64) -> f64 {
 }
 
 impl Toolpath {
-    /// The path as its programs have it: every coordinate is rounded to [`DECIMALS`]. Axes and feeds stay as they are.
+    /// The path as its programs have it: every coordinate is rounded to [`DECIMALS`]. Axes and feeds stay as
+    /// they are.
     pub fn as_written(self) -> Self {
         let at = |at: &ClPoint| ClPoint {
             tip: Point3::from(at.tip.coords.map(|c| in_last_decimals(c) / 10f64.powi(DECIMALS as i32))),

@@ -1,5 +1,5 @@
-//! accuracy.md: what a version can do, in figures of its own nightly. Closed forms, engines against each other, strategies
-//! on surfaces, and what engines cost.
+//! accuracy.md: what a version can do, in figures of its own nightly. Closed forms, engines against each
+//! other, strategies on surfaces, and what engines cost.
 
 use super::checks::{Measured, Study, studies};
 use super::published::{Ours, Published};

@@ -1,7 +1,7 @@
 //! Checks that need no baseline: figures against closed forms, and engines and cells against each other.
 //!
-//! A figure with an error bound says that the truth is within the bound. So it must agree with a closed form within its
-//! bound, and two measurements of one path within the sum of theirs.
+//! A figure with an error bound says that the truth is within the bound. So it must agree with a closed form
+//! within its bound, and two measurements of one path within the sum of theirs.
 
 use super::compare::{Finding, capital, finding};
 use super::figures::{FIGURES, Figure};
@@ -20,7 +20,8 @@ pub struct Study<'a> {
     pub toolpath: &'a str,
     /// Which figure.
     pub figure: &'static Figure,
-    /// What the measurements are compared with, mm: the closed form, or else what the scene as written measured.
+    /// What the measurements are compared with, mm: the closed form, or else what the scene as written
+    /// measured.
     pub truth: f64,
     /// Error bound of `truth`, mm.
     pub truth_bound: f64,
@@ -109,8 +110,8 @@ fn measured<'a>(scene: &'a SceneResult, toolpath: &ToolpathResult, figure: &Figu
     Some(Measured { scene, value: *value, bound: *bound })
 }
 
-/// The measurement of another run, if it cut the same path. A plan that is corrected by its measurements is another path
-/// with each engine.
+/// The measurement of another run, if it cut the same path. A plan that is corrected by its measurements is
+/// another path with each engine.
 fn same_path<'a>(other: &'a SceneResult, plain: &ToolpathResult, figure: &Figure) -> Option<Measured<'a>> {
     const LENGTH: &str = "cutting_length_mm";
     let toolpath = other.toolpaths().iter().find(|toolpath| toolpath.name == plain.name)?;

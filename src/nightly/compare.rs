@@ -62,8 +62,8 @@ impl Comparison {
     }
 }
 
-/// Compares a nightly with a baseline. Without one, only scenes that failed and figures that contradict each other are
-/// worse. A shard is compared on its own scenes alone.
+/// Compares a nightly with a baseline. Without one, only scenes that failed and figures that contradict each
+/// other are worse. A shard is compared on its own scenes alone.
 pub fn compare(now: &Results, baseline: Option<&Results>, rules: &Rules) -> Comparison {
     let mut found = Comparing { rules, all: Comparison::default(), figures: Vec::new() };
     found.all.baseline = baseline.map(|baseline| baseline.date.clone());

@@ -2,8 +2,8 @@
 
 /// Seconds since 1970 as UTC, `2026-11-23T04:30:00Z` (RFC 3339).
 ///
-/// The calendar is that of H. F. Fliegel and T. C. van Flandern (Communications of the ACM 11, 1968, p. 657), in the form
-/// that counts years from March, so that the leap day is the last of its year.
+/// The calendar is that of H. F. Fliegel and T. C. van Flandern (Communications of the ACM 11, 1968, p. 657),
+/// in the form that counts years from March, so that the leap day is the last of its year.
 pub fn date_of(unix_s: u64) -> String {
     const DAY: u64 = 86_400;
     /// Days from 1 March of year 0 to 1 January 1970.

@@ -1,4 +1,5 @@
-//! report.html: one page that opens offline. What got worse first, then each figure with its change and its trend.
+//! report.html: one page that opens offline. What got worse first, then each figure with its change and its
+//! trend.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -7,8 +7,8 @@ use super::results::{Outcome, Results, SceneResult};
 use super::words::first_line;
 use report::xml_escaped as escaped;
 
-/// A test case for each scene and for each toolpath. What got worse is a failure, a scene that newly failed is an error,
-/// and one that failed in the baseline too is skipped.
+/// A test case for each scene and for each toolpath. What got worse is a failure, a scene that newly failed
+/// is an error, and one that failed in the baseline too is skipped.
 pub fn junit(results: &Results, comparison: &Comparison) -> String {
     let mut cases = String::new();
     let mut counts = Counts::default();

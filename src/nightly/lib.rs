@@ -1,5 +1,5 @@
-//! The nightly report, from plain data. Enters: the reports of many scenes, a baseline, rules, the history. Leaves: what
-//! got worse, and the pages that show it.
+//! The nightly report, from plain data. Enters: the reports of many scenes, a baseline, rules, the history.
+//! Leaves: what got worse, and the pages that show it.
 //!
 //! Nothing here reads a file, starts a process or knows the time. The command does (`cli::nightly`).
 

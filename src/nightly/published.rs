@@ -1,4 +1,5 @@
-//! What sources have published, and where ours is: the `--published` file of a nightly, and the table that it leaves.
+//! What sources have published, and where ours is: the `--published` file of a nightly, and the table that it
+//! leaves.
 //!
 //! ```toml
 //! [[published]]

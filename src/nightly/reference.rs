@@ -1,8 +1,9 @@
 //! The work that a run's cost is measured against.
 
-/// A fixed computation: the lowest of many balls over a grid of points, plain and brute. It has the mix of square roots,
-/// comparisons and memory that simulation has, and none of its code: a slower simulation must not make the reference
-/// slower too. Takes some milliseconds on one thread. Leaves a sum, so that no compiler leaves the work out.
+/// A fixed computation: the lowest of many balls over a grid of points, plain and brute. It has the mix of
+/// square roots, comparisons and memory that simulation has, and none of its code: a slower simulation must
+/// not make the reference slower too. Takes some milliseconds on one thread. Leaves a sum, so that no
+/// compiler leaves the work out.
 ///
 /// Do not change it: every cost of every history is measured against it.
 pub fn reference_work() -> f64 {

@@ -85,8 +85,8 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// CPU time, or else time from start to end, as a multiple of the reference work's time. It is what two machines, or
-    /// one on two nights, can compare. `None` where the reference work took no time.
+    /// CPU time, or else time from start to end, as a multiple of the reference work's time. It is what two
+    /// machines, or one on two nights, can compare. `None` where the reference work took no time.
     pub fn ratio(&self) -> Option<f64> {
         let ratio = self.cpu_s.unwrap_or(self.wall_s) / self.reference_s;
         ratio.is_finite().then_some(ratio)
@@ -178,7 +178,8 @@ impl SceneResult {
 }
 
 impl Outcome {
-    /// What the text of a report.json says, with the `further` values of each toolpath that stand at these places.
+    /// What the text of a report.json says, with the `further` values of each toolpath that stand at these
+    /// places.
     ///
     /// # Errors
     /// [`ResultsError`] where it is none.

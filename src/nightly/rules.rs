@@ -95,8 +95,8 @@ pub struct Rules {
 }
 
 impl Default for Rules {
-    /// Figures are the same bits on every run, so their limits are small: they hide only what other compilers and
-    /// processors round differently. Times vary by a fifth and more on shared machines.
+    /// Figures are the same bits on every run, so their limits are small: they hide only what other compilers
+    /// and processors round differently. Times vary by a fifth and more on shared machines.
     fn default() -> Self {
         Self {
             checks: Vec::new(),
@@ -111,8 +111,8 @@ impl Default for Rules {
 }
 
 impl Rules {
-    /// Reads a rule file; what it does not name keeps its default. `name` is how messages call it, `engines` are the
-    /// words of all engines.
+    /// Reads a rule file; what it does not name keeps its default. `name` is how messages call it, `engines`
+    /// are the words of all engines.
     ///
     /// # Errors
     /// [`SceneError`] with the place and the cure.

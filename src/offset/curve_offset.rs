@@ -131,8 +131,8 @@ fn left_of(v: &Vector2) -> Vector2 {
 }
 
 /// The offset of `curve` by `distance`, mm, positive to its left, without what is nearer to the curve than
-/// that. Its splines keep the distance within `tolerance`, mm. Stretches also end at the parameters `breaks` of the curve, as
-/// if corners were there.
+/// that. Its splines keep the distance within `tolerance`, mm. Stretches also end at the parameters `breaks`
+/// of the curve, as if corners were there.
 ///
 /// # Errors
 /// A distance or a tolerance that cannot be, a curve with a cusp, an offset of which nothing is left.

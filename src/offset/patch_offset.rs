@@ -1,10 +1,10 @@
 //! The true offset of a NURBS patch: every point moved by the same distance along its unit normal.
 //!
-//! Enters: a patch and a signed distance, mm, along `du × dv` (negative: to the other side). Leaves: the places
-//! where the offset is singular ([`OffsetSurface::singular_places`]).
+//! Enters: a patch and a signed distance, mm, along `du × dv` (negative: to the other side). Leaves: the
+//! places where the offset is singular ([`OffsetSurface::singular_places`]).
 //!
-//! The sign of curvature is that of [`geometry::Jet2`]: positive where concave toward `du × dv`. A patch whose
-//! outward side is the other one is offset outward by a negative distance.
+//! The sign of curvature is that of [`geometry::Jet2`]: positive where concave toward `du × dv`. A patch
+//! whose outward side is the other one is offset outward by a negative distance.
 
 mod crease;
 mod singular;

@@ -1,7 +1,7 @@
 //! The walls below the borders of a part that is an open sheet.
 //!
-//! Where all faces look up, what is below them is solid, and ends at each border as at a vertical wall: down to the surface beyond where there
-//! is one, as between two plates. mm.
+//! Where all faces look up, what is below them is solid, and ends at each border as at a vertical wall: down
+//! to the surface beyond where there is one, as between two plates. mm.
 
 use super::{LEAST_UPRIGHT, Part};
 use geometry::{Bvh, Point3, TriangleMesh, Vector3};
@@ -16,7 +16,8 @@ pub(super) struct BorderWalls {
     outward: Vec<Vector3>,
 }
 
-/// Sides of a border are told apart so far from it, mm, and by twice as much as patches that meet may lie apart.
+/// Sides of a border are told apart so far from it, mm, and by twice as much as patches that meet may lie
+/// apart.
 const ASIDE: f64 = 1e-6;
 
 /// How far from a border is looked for what is beyond, mm.
@@ -80,8 +81,9 @@ fn wall(part: &Part, t: usize, side: usize) -> Option<[Point3; 4]> {
 }
 
 impl Part {
-    /// The nearest place of the walls that end the solid below a sheet whose faces all look up, nearer than a distance, mm, of those whose unit normal
-    /// out of it `counts`; `None` without such, and for any other part.
+    /// The nearest place of the walls that end the solid below a sheet whose faces all look up, nearer than a
+    /// distance, mm, of those whose unit normal out of it `counts`; `None` without such, and for any other
+    /// part.
     pub fn nearest_border_wall(
         &self,
         q: &Point3,
@@ -98,8 +100,9 @@ impl Part {
 mod tests {
     use super::*;
 
-    /// Two level plates beside each other, one 2 mm higher: below its border there the wall goes down to the lower plate, which has none on
-    /// that side; all other borders have walls down to far below. A part with a face that looks down has none.
+    /// Two level plates beside each other, one 2 mm higher: below its border there the wall goes down to the
+    /// lower plate, which has none on that side; all other borders have walls down to far below. A part with
+    /// a face that looks down has none.
     #[test]
     fn walls_end_what_is_solid_below_a_sheet() {
         let plate = |x: f64, z: f64| {

@@ -160,7 +160,8 @@ impl Part {
 
     /// The bounds of the mesh and of the borders of the patches, which bulge out between its corners.
     fn bounds_with_borders(&self) -> Aabb {
-        /// Stretches between two corners whose ends are looked at: at most a sixteenth of the bulge is missed.
+        /// Stretches between two corners whose ends are looked at: at most a sixteenth of the bulge is
+        /// missed.
         const LOOKS: usize = 4;
         let mut bounds = self.mesh.bounds();
         for t in 0..self.mesh.triangles().len() {

@@ -72,15 +72,16 @@ pub struct Part {
     bvh: Bvh,
     bounds: Aabb,
     deviation: f64,
-    /// For each triangle, whether a line through it may meet another patch; empty for parts of one patch and meshes.
+    /// For each triangle, whether a line through it may meet another patch; empty for parts of one patch and
+    /// meshes.
     beside_others: Vec<bool>,
     repairs: RepairNotes,
     /// Made when it is first asked for.
     border_walls: OnceLock<Option<BorderWalls>>,
 }
 
-/// A parameter within this share of its range from an end is at the end: a thousand times f64's rounding, a millionth of a
-/// cutter.
+/// A parameter within this share of its range from an end is at the end: a thousand times f64's rounding, a
+/// millionth of a cutter.
 const PATCH_END: f64 = 1e-10;
 
 /// Points nearer than this, mm, are the same point of a closed seam.
@@ -108,7 +109,8 @@ impl Part {
         &self.bvh
     }
 
-    /// Bounds of the exact surface up to the tessellation's deviation; in the plan those of the borders of patches themselves.
+    /// Bounds of the exact surface up to the tessellation's deviation; in the plan those of the borders of
+    /// patches themselves.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
@@ -161,7 +163,8 @@ impl Part {
         ends(at.u, domain[0]) || ends(at.v, domain[1])
     }
 
-    /// True where the part ends with a patch: where one does, and no other comes near. Always false on a mesh part.
+    /// True where the part ends with a patch: where one does, and no other comes near. Always false on a mesh
+    /// part.
     pub fn ends_with_patch_at(&self, place: &SurfacePoint) -> bool {
         place.at.is_some_and(|at| {
             let goes_on =
@@ -222,7 +225,8 @@ impl Part {
         (SurfacePoint { point: foot.jet.p, normal, at, triangle }, side * foot.distance)
     }
 
-    /// The nearest point of the mesh of all patches but the `first` and those that were `asked` since, nearer than a distance, mm.
+    /// The nearest point of the mesh of all patches but the `first` and those that were `asked` since, nearer
+    /// than a distance, mm.
     fn nearest_of_others(&self, q: &Point3, within: f64, first: usize, asked: &[usize]) -> Option<MeshFoot> {
         let is_new = |patch: usize| patch != first && !asked.contains(&patch);
         let is_other = |t: usize| self.patch_of(t as u32).is_some_and(is_new);
@@ -276,8 +280,8 @@ impl Part {
     /// [`Part::mesh_deviation`] of the part's border either answer may come.
     ///
     /// # Tolerance
-    /// The point lies on the exact surface to 1e-12 mm (where `(x, y)` is beside the part's border by
-    /// less than the deviation, on the tangent plane there). Which of two sheets of one patch is the higher one is
+    /// The point lies on the exact surface to 1e-12 mm (where `(x, y)` is beside the part's border by less
+    /// than the deviation, on the tangent plane there). Which of two sheets of one patch is the higher one is
     /// decided on the mesh.
     pub fn highest_at(&self, x: f64, y: f64) -> Option<SurfacePoint> {
         let hit = self.bvh.highest_at(&self.mesh, x, y);
@@ -305,8 +309,9 @@ impl Part {
         }
     }
 
-    /// The place of the patch of triangle `t` over or below `(x, y)`, and 0; where that patch has ended there, its place nearest in
-    /// the plan, as far as a descent from the triangle finds it, and how far aside that lies, mm. `None` on a mesh part.
+    /// The place of the patch of triangle `t` over or below `(x, y)`, and 0; where that patch has ended
+    /// there, its place nearest in the plan, as far as a descent from the triangle finds it, and how far
+    /// aside that lies, mm. `None` on a mesh part.
     pub fn on_patch_of(&self, t: usize, x: f64, y: f64) -> Option<(SurfacePoint, f64)> {
         let index = self.patch_of(t as u32)?;
         let patch = &self.patches[index];

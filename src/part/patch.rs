@@ -81,7 +81,8 @@ impl Patch {
     }
 }
 
-/// Normal of a jet at parameters; at a pole its limit, or that of the surface close by; up where there is none.
+/// Normal of a jet at parameters; at a pole its limit, or that of the surface close by; up where there is
+/// none.
 pub(super) fn normal_of(surface: &NurbsSurface, jet: &Jet2, at: [f64; 2]) -> Vector3 {
     normal_at(surface, jet, at).unwrap_or_else(Vector3::z)
 }

@@ -1,8 +1,8 @@
-//! From a place near the surface to the exact surface: feet of perpendiculars and meetings with
-//! vertical lines, by Newton's method in the patch's parameters, which stay inside their range.
+//! From a place near the surface to the exact surface: feet of perpendiculars and meetings with vertical
+//! lines, by Newton's method in the patch's parameters, which stay inside their range.
 //!
-//! Where two distances are equal within rounding, a step is judged by what it leaves to gain. Past a centre of curvature
-//! Newton's step would climb; there it goes downhill by the size of each bend.
+//! Where two distances are equal within rounding, a step is judged by what it leaves to gain. Past a centre
+//! of curvature Newton's step would climb; there it goes downhill by the size of each bend.
 
 use super::patch::normal_of;
 use super::{LEAST_UPRIGHT, Patch};

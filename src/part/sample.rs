@@ -136,8 +136,8 @@ impl Part {
         }
     }
 
-    /// A patch ends up to the deviation beside its triangles: where two meet, gaps stay between theirs, and where the part ends,
-    /// it ends beyond them. Centres that fall there lie beside one on the part.
+    /// A patch ends up to the deviation beside its triangles: where two meet, gaps stay between theirs, and
+    /// where the part ends, it ends beyond them. Centres that fall there lie beside one on the part.
     fn fill_beside_triangles(&self, lines: &Lines, nx: usize, samples: &mut [GridSample]) {
         if self.patches.is_empty() {
             return;

@@ -1,5 +1,6 @@
-//! Where patches meet, for vertical lines. The mesh of each patch leaves its border by up to the deviation, so that a line there may
-//! pass between the triangles of two patches, or through those of a patch that has ended.
+//! Where patches meet, for vertical lines. The mesh of each patch leaves its border by up to the deviation,
+//! so that a line there may pass between the triangles of two patches, or through those of a patch that has
+//! ended.
 
 use super::{LEAST_UPRIGHT, Part, ROUNDING, refine};
 use geometry::{Point2, Vector2};
@@ -14,8 +15,9 @@ pub(super) struct OnPatch {
 }
 
 impl Part {
-    /// Where the vertical line through `(x, y)` meets a patch other than the `known` one that is higher, or goes on where that has
-    /// ended; else the known meeting. With none known, that of a patch whose triangles end before it does.
+    /// Where the vertical line through `(x, y)` meets a patch other than the `known` one that is higher, or
+    /// goes on where that has ended; else the known meeting. With none known, that of a patch whose triangles
+    /// end before it does.
     pub(super) fn across_seams(&self, known: Option<OnPatch>, x: f64, y: f64) -> Option<OnPatch> {
         let lies_within = |found: &OnPatch| !self.beside_others[found.triangle as usize];
         if known.as_ref().is_some_and(|found| self.patches.len() < 2 || lies_within(found)) {
@@ -23,7 +25,8 @@ impl Part {
         }
         let within = self.across();
         let is_exact = |found: &OnPatch| found.meeting.miss <= ROUNDING;
-        // Where a patch has ended, the next one goes on as high as its tangent plane, but for the crease between them.
+        // Where a patch has ended, the next one goes on as high as its tangent plane, but for the crease
+        // between them.
         let floor = known.as_ref().map_or(f64::NEG_INFINITY, |found| {
             let crease = within / found.meeting.normal.z.abs().max(LEAST_UPRIGHT);
             found.meeting.z - if is_exact(found) { 0.0 } else { crease }
@@ -63,7 +66,8 @@ impl Part {
                 floor.max(found.meeting.z)
             },
         );
-        // Patches of a file may end a little before each other. Where all ends lie on one side, the part ends.
+        // Patches of a file may end a little before each other. Where all ends lie on one side, the part
+        // ends.
         best.or(beside.filter(|_| is_between).map(|(nearest, _)| nearest))
     }
 
@@ -72,7 +76,8 @@ impl Part {
         2.0 * self.deviation + ROUNDING
     }
 
-    /// For each triangle, whether those of another patch come so near in the plan that a line may meet either, and are no lower.
+    /// For each triangle, whether those of another patch come so near in the plan that a line may meet
+    /// either, and are no lower.
     pub(super) fn find_those_beside_others(&self) -> Vec<bool> {
         if self.patches.len() < 2 {
             return Vec::new();

@@ -1,9 +1,10 @@
 //! Cutter locations in APT (ISO 3592, ISO 4343), as NX, CATIA, Creo and this project write them.
 //!
-//! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
-//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID, MSYS), what describes it is kept
-//! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move tool or part and is not
-//! understood stops the reading. Text that goes into the program as it stands (INSERT, PREFUN, AUXFUN) may move both, too.
+//! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the
+//! next line, `$$` begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO,
+//! RAPID, MSYS), what describes it is kept (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves
+//! nothing is passed over, and what may move tool or part and is not understood stops the reading. Text that
+//! goes into the program as it stands (INSERT, PREFUN, AUXFUN) may move both, too.
 
 use geometry::{Point3, Vector3};
 
@@ -14,8 +15,8 @@ use crate::lines::Lines;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 use crate::tools::{Said, cutter_of_remark, same_cutter};
 
-/// Major words that move neither tool nor part: what is printed or shown, coolant and stops, tolerances that the locations keep already,
-/// levels and limits that other words act on.
+/// Major words that move neither tool nor part: what is printed or shown, coolant and stops, tolerances that
+/// the locations keep already, levels and limits that other words act on.
 const QUIET: [&str; 28] = [
     "PARTNO",
     "PPRINT",
@@ -71,7 +72,8 @@ const MOST_LINES: usize = 1000;
 /// Tool axes that differ by less, rad, are one: four decimals round as far.
 const SAME_AXIS: f64 = 2e-4;
 
-/// Ends may miss the radius of a CIRCLE by this much, mm, or by a share of the radius, as those of arcs in G-code.
+/// Ends may miss the radius of a CIRCLE by this much, mm, or by a share of the radius, as those of arcs in
+/// G-code.
 const RADIUS_TOLERANCE: f64 = 0.01;
 
 /// What CIRCLE says of the motion that follows.

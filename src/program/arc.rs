@@ -8,7 +8,8 @@ use crate::frame::Place;
 use crate::interpret::{AXES, Interpreter};
 use crate::program::Arc;
 
-/// Difference of the radii at both ends that is allowed as a share of the radius: programs round to a thousandth.
+/// Difference of the radii at both ends that is allowed as a share of the radius: programs round to a
+/// thousandth.
 const TOLERANCE_SHARE: f64 = 1e-3;
 
 /// But never more than this, mm.
@@ -96,7 +97,8 @@ impl Interpreter<'_> {
         Ok([from(u) + words[0].unwrap_or(0.0) * modal.unit, from(v) + words[1].unwrap_or(0.0) * modal.unit])
     }
 
-    /// The centre in the plane from a radius: the arc of less than half a turn, or of more where R is negative.
+    /// The centre in the plane from a radius: the arc of less than half a turn, or of more where R is
+    /// negative.
     fn centre_by_radius(
         &self,
         [u, v]: [usize; 2],
@@ -141,7 +143,8 @@ pub(crate) fn sweep(a: [f64; 2], b: [f64; 2], radius: f64, clockwise: bool) -> f
 }
 
 impl Arc {
-    /// The place at the share `t` of the way from `start` to `end`: the radius changes evenly between those of both ends.
+    /// The place at the share `t` of the way from `start` to `end`: the radius changes evenly between those
+    /// of both ends.
     pub fn at(&self, start: &[f64; 3], end: &[f64; 3], t: f64) -> [f64; 3] {
         if t >= 1.0 {
             return *end;
@@ -164,7 +167,8 @@ impl Arc {
         [0, 1, 2].map(|k| self.centre[k] + grown * (cos * spoke[k] + sin * across[k]) + t * rise * n[k])
     }
 
-    /// How far the arc strays at most from so many chords, mm: an eighth of the square of their step times its bend.
+    /// How far the arc strays at most from so many chords, mm: an eighth of the square of their step times
+    /// its bend.
     pub fn strays(&self, start: &[f64; 3], end: &[f64; 3], chords: usize) -> f64 {
         let [first, last] = [start, end].map(|at| {
             let spoke = [0, 1, 2].map(|k| at[k] - self.centre[k]);

@@ -1,4 +1,5 @@
-//! A block: the words of one line. Enters: a line of bytes. Leaves: values by letter, the codes of G and M, assignments.
+//! A block: the words of one line. Enters: a line of bytes. Leaves: values by letter, the codes of G and M,
+//! assignments.
 
 use crate::control::Control;
 use crate::cursor::Cursor;
@@ -131,7 +132,8 @@ impl Block {
         self.present == 0 && self.g.count == 0 && self.m.count == 0 && self.assignments.is_empty()
     }
 
-    /// Reads a line. Stops before a word of control flow (`O`, `IF`, `WHILE`, `GOTO`, `DO`, `END`) and leaves its place.
+    /// Reads a line. Stops before a word of control flow (`O`, `IF`, `WHILE`, `GOTO`, `DO`, `END`) and leaves
+    /// its place.
     pub fn read(
         &mut self,
         line: &[u8],
@@ -335,7 +337,8 @@ pub(crate) fn plain_name(text: &[u8]) -> String {
     name(text)
 }
 
-/// Whether a line is words of a block, one of which moves an axis; remarks left aside. No expression is computed.
+/// Whether a line is words of a block, one of which moves an axis; remarks left aside. No expression is
+/// computed.
 pub(crate) fn has_axis_words(line: &[u8]) -> bool {
     let (mut depth, mut code) = (0, Vec::new());
     for byte in line.split(|b| *b == b';').next().unwrap_or_default() {

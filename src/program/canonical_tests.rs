@@ -1,5 +1,5 @@
-//! Every program of the corpus against the motion that LinuxCNC's own interpreter makes of it, move by move: end point,
-//! centre, sense, plane and feed. `tests/programs/README.md` says how that motion is made anew.
+//! Every program of the corpus against the motion that LinuxCNC's own interpreter makes of it, move by move:
+//! end point, centre, sense, plane and feed. `tests/programs/README.md` says how that motion is made anew.
 
 use std::path::{Path, PathBuf};
 

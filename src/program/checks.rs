@@ -1,5 +1,5 @@
-//! What is wrong with a program before anything is cut: feeds without a spindle, without a feed, without a tool, with the
-//! length of another tool, and a text that breaks off.
+//! What is wrong with a program before anything is cut: feeds without a spindle, without a feed, without a
+//! tool, with the length of another tool, and a text that breaks off.
 
 use crate::program::{Program, Setting, Spindle, StepKind};
 
@@ -55,8 +55,8 @@ pub struct Finding {
 }
 
 impl Program {
-    /// All findings, each kind once for each tool, in the order of their lines. `lengths` are those of the tools, mm, where
-    /// they are known.
+    /// All findings, each kind once for each tool, in the order of their lines. `lengths` are those of the
+    /// tools, mm, where they are known.
     pub fn findings(&self, lengths: &dyn Fn(u32) -> Option<f64>) -> Vec<Finding> {
         let mut found: Vec<Finding> = Vec::new();
         let named = self.settings.iter().any(|setting| setting.tool > 0);

@@ -2,9 +2,10 @@
 //!
 //! Enters: the programmed moves. Leaves: moves of the cutter's axis, the radius to the left or right of them.
 //!
-//! - The first move is straight, longer than the radius, and ends beside its programmed end, at right angles to it.
-//! - Round an outer corner the axis runs on an arc about the corner, straight before a rapid move. Before an inner corner it turns where both ways meet. Corners
-//!   that turn by less than [`STRAIGHT`] are none.
+//! - The first move is straight, longer than the radius, and ends beside its programmed end, at right angles
+//!   to it.
+//! - Round an outer corner the axis runs on an arc about the corner, straight before a rapid move. Before an
+//!   inner corner it turns where both ways meet. Corners that turn by less than [`STRAIGHT`] are none.
 //! - G40 ends it: the next move goes straight from where the axis is.
 //!
 //! A move leaves once the next one has told where it ends. mm, in the program's coordinates.
@@ -218,7 +219,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// The radius by the word D: a number of a tool, or under G41.1 a diameter; else that of the tool in the spindle.
+    /// The radius by the word D: a number of a tool, or under G41.1 a diameter; else that of the tool in the
+    /// spindle.
     fn compensated_radius(&mut self, word: CodeWord) -> Result<f64, Stop> {
         let column =
             if self.block.peek(b'D').is_some() { self.block.column(b'D') } else { usize::from(word.column) };

@@ -1,7 +1,7 @@
 //! What controls differ in, as data: their codes, and what some words mean.
 //!
-//! Sources: ISO 6983-1, LinuxCNC G-code reference 2.9, Fanuc 0i-F and Haas mill operator's manuals, grbl 1.1, Mach3 users'
-//! manual, Siemens 840D ISO dialects.
+//! Sources: ISO 6983-1, LinuxCNC G-code reference 2.9, Fanuc 0i-F and Haas mill operator's manuals, grbl 1.1,
+//! Mach3 users' manual, Siemens 840D ISO dialects.
 
 use crate::frame::WORK_OFFSETS;
 
@@ -231,7 +231,8 @@ impl Variables {
         (set < sets && axis < 6).then_some((set, axis))
     }
 
-    /// Whether setting it is followed: work offsets, the alarm #3000, and timers, blocks and messages that move nothing.
+    /// Whether setting it is followed: work offsets, the alarm #3000, and timers, blocks and messages that
+    /// move nothing.
     pub fn is_settable(&self, number: u32) -> bool {
         let known = || matches!(number, 3000..=3004 | 3006) || self.offset(number).is_some();
         number > 0 && (self.is_free(number) || self.of_fanuc && known())
@@ -251,12 +252,13 @@ pub struct Control {
     pub one_shift: bool,
     /// How far above the last depth a peck begins to feed again, and how far a chip is broken by, mm.
     pub peck_clearance: f64,
-    /// Whether a cycle that begins at its retract plane or below rises on the way to its hole to where it ends, and G89 feeds
-    /// up to there.
+    /// Whether a cycle that begins at its retract plane or below rises on the way to its hole to where it
+    /// ends, and G89 feeds up to there.
     pub cycles_by_level: bool,
     /// Letters of the repeats of a cycle, and the fewest that it takes.
     pub cycle_repeats: (&'static [u8], u32),
-    /// Whether R and Z of a cycle stay for the next hole as they were written, not as the levels that they meant.
+    /// Whether R and Z of a cycle stay for the next hole as they were written, not as the levels that they
+    /// meant.
     pub cycle_words_stay: bool,
     /// Whether a motion and another code that takes axis words are refused in one block.
     pub axis_words_once: bool,
@@ -282,12 +284,14 @@ pub struct Control {
     pub repeats_in_p: bool,
     /// Whether P of a dwell counts milliseconds where it has no decimal point; else seconds.
     pub dwell_in_ms: bool,
-    /// The M words, in tenths, with which the control begins and ends to move the linear axes along with the rotary ones.
+    /// The M words, in tenths, with which the control begins and ends to move the linear axes along with the
+    /// rotary ones.
     pub tcp_switch: Option<[u16; 2]>,
-    /// Under which setting rapid moves run straight, in a clause, where they may lead each axis at its own rate; `None` where they run
-    /// straight on all of them.
+    /// Under which setting rapid moves run straight, in a clause, where they may lead each axis at its own
+    /// rate; `None` where they run straight on all of them.
     pub straight_rapids: Option<&'static str>,
-    /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as well.
+    /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as
+    /// well.
     pub arc_tolerance: f64,
 }
 

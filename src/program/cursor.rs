@@ -15,7 +15,8 @@ const TEN: [f64; 23] = [
     1e19, 1e20, 1e21, 1e22,
 ];
 
-/// Whole numbers below this are exact in f64, so that one division by a power of ten rounds once (W. D. Clinger, 1990).
+/// Whole numbers below this are exact in f64, so that one division by a power of ten rounds once (W. D.
+/// Clinger, 1990).
 const EXACT: u64 = 1 << 53;
 
 /// Digits of which a u64 holds every number.

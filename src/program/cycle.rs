@@ -1,8 +1,8 @@
 //! Cycles over holes (G73, G74, G76, G81 to G89) as the moves that a control makes of them.
 //!
-//! A cycle moves over the hole, down to the retract plane R, down at feed as its kind has it, and up to the plane that G98 or
-//! G99 names. Bottom, R and Q stay for the holes that follow. In G91, R counts from the level before the first cycle and the
-//! bottom from R.
+//! A cycle moves over the hole, down to the retract plane R, down at feed as its kind has it, and up to the
+//! plane that G98 or G99 names. Bottom, R and Q stay for the holes that follow. In G91, R counts from the
+//! level before the first cycle and the bottom from R.
 
 use crate::control::{Cycle, Down};
 use crate::error::{Fault, Stop};

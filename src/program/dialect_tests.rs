@@ -1,4 +1,5 @@
-//! Words that controls read in different ways, by closed forms, and what is refused where the machine alone could know.
+//! Words that controls read in different ways, by closed forms, and what is refused where the machine alone
+//! could know.
 
 use crate::control::{FANUC, GRBL, HAAS, LINUXCNC};
 use crate::*;

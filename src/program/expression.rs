@@ -1,9 +1,9 @@
 //! Expressions in brackets: `[#1 + 2 * SIN[30]] / 3`. Angles in degrees.
 //!
-//! A Pratt parser that computes while it reads. A tree would be built anew for each pass of a loop, because values are bound
-//! to the line; a parser crate would add a layer for five levels of operators, and its errors would not know the column.
-//! The levels are those of LinuxCNC: `**`, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`. Fanuc's are the
-//! same without `**`.
+//! A Pratt parser that computes while it reads. A tree would be built anew for each pass of a loop, because
+//! values are bound to the line; a parser crate would add a layer for five levels of operators, and its
+//! errors would not know the column. The levels are those of LinuxCNC: `**`, then `* / MOD`, then `+ -`, then
+//! comparisons, then `AND OR XOR`. Fanuc's are the same without `**`.
 
 use crate::control::Logic;
 use crate::cursor::Cursor;

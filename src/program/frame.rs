@@ -1,4 +1,5 @@
-//! From the coordinates of a program to those of the machine: work offsets, shifts, rotations, the tool's length.
+//! From the coordinates of a program to those of the machine: work offsets, shifts, rotations, the tool's
+//! length.
 //!
 //! mm and degrees. The tip is where the tool's length would put it: machine coordinates less that length.
 

@@ -1,5 +1,5 @@
-//! What rs274 cannot tell: words of Fanuc, Haas, grbl and Mach by closed forms, faults with their places, bounds on what
-//! never ends.
+//! What rs274 cannot tell: words of Fanuc, Haas, grbl and Mach by closed forms, faults with their places,
+//! bounds on what never ends.
 
 use crate::control::{FANUC, GRBL, HAAS, LINUXCNC};
 use crate::*;
@@ -226,7 +226,8 @@ fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);
 }
 
-/// Where a work offset that nobody set is on the machine is not known, so that one with machine coordinates has no place beside it.
+/// Where a work offset that nobody set is on the machine is not known, so that one with machine coordinates
+/// has no place beside it.
 #[test]
 fn an_offset_beside_one_that_nobody_knows_is_refused() {
     let read = |text: &str, control| read_gcode("a.nc", text.as_bytes(), control, &Setup::from_above(200.0));
@@ -323,7 +324,8 @@ fn lengths_count_for_the_tip() {
     assert!(program.findings(&|_| None).iter().any(|found| found.kind == FindingKind::OtherLength));
 }
 
-/// The nose stands as the control lays it; the tip hangs from it by the tool's own length along the leaning axis.
+/// The nose stands as the control lays it; the tip hangs from it by the tool's own length along the leaning
+/// axis.
 #[test]
 fn a_head_swings_each_tool_by_its_own_length() {
     let (sin, cos) = 30f64.to_radians().sin_cos();

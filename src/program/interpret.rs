@@ -1,7 +1,7 @@
 //! A control at work: block after block, what each makes of the state, and the motions that leave.
 //!
-//! The order within a block is that of LinuxCNC and ISO 6983: feed mode, F, S, T, M6, spindle, then the codes that set
-//! something, then the motion, then stops.
+//! The order within a block is that of LinuxCNC and ISO 6983: feed mode, F, S, T, M6, spindle, then the codes
+//! that set something, then the motion, then stops.
 
 mod motion;
 mod offsets;
@@ -85,7 +85,8 @@ pub(crate) struct Interpreter<'a> {
     moved: bool,
     /// It has fed.
     fed: bool,
-    /// The axes that have been led to a place, and whether this block is the first one that does so with one of them.
+    /// The axes that have been led to a place, and whether this block is the first one that does so with one
+    /// of them.
     placed: [bool; 6],
     places: bool,
     most_repeats: u64,

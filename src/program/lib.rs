@@ -1,14 +1,15 @@
 //! Programs of other systems, read as motion.
 //!
-//! Enters: the text of a program (G-code as controls and CAM systems write it, or APT cutter locations), a control, and what
-//! the machine finds when it starts. Leaves: a [`Program`]: every motion with its line, tool and feed, arcs as exact arcs, and
-//! remarks on what moves nothing. Lengths in mm, angles in degrees where they are axis values, feeds in mm/min.
+//! Enters: the text of a program (G-code as controls and CAM systems write it, or APT cutter locations), a
+//! control, and what the machine finds when it starts. Leaves: a [`Program`]: every motion with its line,
+//! tool and feed, arcs as exact arcs, and remarks on what moves nothing. Lengths in mm, angles in degrees
+//! where they are axis values, feeds in mm/min.
 //!
-//! What may move the tool and is not understood stops the reading with its line, column and cure. Nothing is read from files
-//! here, and no input makes it panic or run without end.
+//! What may move the tool and is not understood stops the reading with its line, column and cure. Nothing is
+//! read from files here, and no input makes it panic or run without end.
 //!
-//! Text becomes words (`block`), words become codes in force and motion (`interpret`), a motion becomes a step (`program`).
-//! Controls differ as data only (`control`).
+//! Text becomes words (`block`), words become codes in force and motion (`interpret`), a motion becomes a
+//! step (`program`). Controls differ as data only (`control`).
 
 mod apt;
 mod arc;

@@ -1,4 +1,5 @@
-//! The variables of a program: `#1` to `#99999` and `#<names>`. Each call of a subprogram has locals of its own.
+//! The variables of a program: `#1` to `#99999` and `#<names>`. Each call of a subprogram has locals of its
+//! own.
 
 use std::collections::HashMap;
 

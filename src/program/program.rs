@@ -106,7 +106,8 @@ pub struct Program {
     pub steps: Vec<Step>,
     /// How long the machine dwells, s, each before the step of an index; 0 where it only comes to rest.
     pub dwells: Vec<(usize, f64)>,
-    /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to its first place.
+    /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to
+    /// its first place.
     pub approach: usize,
     /// The steps that lead X, Y and Z to their first places.
     pub first: [Option<usize>; 3],
@@ -114,7 +115,8 @@ pub struct Program {
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.
     pub settings: Vec<Setting>,
-    /// The part's zero in machine coordinates: the origin of the program where it first moves. Rotary axes of a head do not count from it.
+    /// The part's zero in machine coordinates: the origin of the program where it first moves. Rotary axes of
+    /// a head do not count from it.
     pub zero: Place,
     /// What was read and moves nothing, and what is doubtful.
     pub notes: Vec<Note>,
@@ -128,7 +130,8 @@ pub struct Program {
     pub lines: usize,
     /// Whether it says where it ends.
     pub ended: bool,
-    /// Tool axes of the steps, and of the start before them, where the program gives them itself (APT); empty else.
+    /// Tool axes of the steps, and of the start before them, where the program gives them itself (APT); empty
+    /// else.
     pub axes: Vec<[f64; 3]>,
 }
 
@@ -138,8 +141,9 @@ impl Program {
         k.checked_sub(1).map_or(&self.start, |before| &self.steps[before].to)
     }
 
-    /// Nobody knows where the tool stands before X, Y and Z are led to their first places: until then it is as high as the program ever
-    /// feeds, and where Z is led first, it comes down at the first place of X and Y. So no way from an assumed place cuts anything.
+    /// Nobody knows where the tool stands before X, Y and Z are led to their first places: until then it is
+    /// as high as the program ever feeds, and where Z is led first, it comes down at the first place of X and
+    /// Y. So no way from an assumed place cuts anything.
     #[must_use]
     pub fn from_above(mut self) -> Self {
         let Self { start, steps, approach, first, .. } = &mut self;
@@ -186,8 +190,8 @@ impl Program {
         self.tools_of(|kind| matches!(kind, StepKind::Feed | StepKind::Arc(_)))
     }
 
-    /// The highest feed of some tools on ways in which no rotary axis turns, mm/min, and its line. Where one turns, the feed is that of
-    /// no single axis.
+    /// The highest feed of some tools on ways in which no rotary axis turns, mm/min, and its line. Where one
+    /// turns, the feed is that of no single axis.
     pub fn highest_feed(&self, of_tool: impl Fn(u32) -> bool) -> Option<(f64, u32)> {
         let fed = |(k, step): (usize, &Step)| {
             let feeds = matches!(step.kind, StepKind::Feed | StepKind::Arc(_));

@@ -1,8 +1,9 @@
 //! From a program to straight moves of tips and axes, one run for each stretch of one tool.
 //!
-//! Enters: a [`Program`] in machine coordinates. Leaves: paths in the coordinates of the part, whose zero is the program's.
-//! Arcs become chords, far nearer than the chord tolerance, and [`motion::Origin::strays`] has how far they are off. Where rotary axes turn, the way of the tip that follows from the machine is
-//! divided so that straight pieces keep the same tolerance.
+//! Enters: a [`Program`] in machine coordinates. Leaves: paths in the coordinates of the part, whose zero is
+//! the program's. Arcs become chords, far nearer than the chord tolerance, and [`motion::Origin::strays`] has
+//! how far they are off. Where rotary axes turn, the way of the tip that follows from the machine is divided
+//! so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
 use machine::kinematics::{Joints, Kinematics, Pace, Side, Way, Waypoint};
@@ -15,7 +16,8 @@ use crate::program::{Arc, Program, Setting, Step, StepKind};
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
 
-/// Moves stray from arcs and turns by no more than this share of the chord tolerance: what is measured has to be known so much better.
+/// Moves stray from arcs and turns by no more than this share of the chord tolerance: what is measured has to
+/// be known so much better.
 const STRAY_SHARE: f64 = 0.1;
 
 /// Length of a tool over which what its axis strays counts as what the tip does, mm.
@@ -50,7 +52,8 @@ pub struct ToolRun {
     pub tool: u32,
     /// Its moves; each knows its line.
     pub path: Toolpath,
-    /// The joints that it goes through on a machine with rotary axes; none of cutter locations, and on other machines.
+    /// The joints that it goes through on a machine with rotary axes; none of cutter locations, and on other
+    /// machines.
     pub joints: Vec<Waypoint>,
 }
 
@@ -230,7 +233,8 @@ impl Layer<'_> {
         (self.placing.lengths)(self.setting.tool).map_or(0.0, |length| self.setting.length[2] - length)
     }
 
-    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where the tool's is not known, both are the machine's.
+    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where the tool's is not
+    /// known, both are the machine's.
     fn lengths(&self, kinematics: &Kinematics) -> [f64; 2] {
         match (self.placing.lengths)(self.setting.tool) {
             Some(own) => [self.setting.length[2], own],
@@ -271,7 +275,8 @@ impl Layer<'_> {
         self.joints_of(kinematics, tip, self.turned(at))
     }
 
-    /// A B C at a place in machine coordinates, degrees: of a table from the part's zero, of a head from the machine's.
+    /// A B C at a place in machine coordinates, degrees: of a table from the part's zero, of a head from the
+    /// machine's.
     fn turned(&self, at: &Place) -> [f64; 3] {
         let in_head = |letter: char| {
             let axes = self.placing.kinematics.map_or(&[][..], |kinematics| kinematics.axes());
@@ -327,7 +332,8 @@ impl Layer<'_> {
         chords
     }
 
-    /// A step whose tool axis the program gives. Places between are not known: the axis turns evenly on the way of the tip.
+    /// A step whose tool axis the program gives. Places between are not known: the axis turns evenly on the
+    /// way of the tip.
     fn follow_axis(&self, k: usize, step: &Step, axis: &[f64; 3], run: &mut Run) -> Result<(), Fault> {
         let (from, to) = (self.program.start_of(k), &step.to);
         if let StepKind::Arc(index) = step.kind {
@@ -371,7 +377,8 @@ impl Layer<'_> {
         Ok(())
     }
 
-    /// How long a feed takes in which axes turn: by its feed, or longer where an axis cannot go so fast. `None` without a feed.
+    /// How long a feed takes in which axes turn: by its feed, or longer where an axis cannot go so fast.
+    /// `None` without a feed.
     fn minutes(&self, from: &Place, to: &Place, step: &Step) -> Result<Option<f64>, Fault> {
         if step.kind == StepKind::Rapid || step.feed <= 0.0 {
             return Ok(None);

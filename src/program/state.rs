@@ -52,7 +52,8 @@ impl Default for Setup {
 }
 
 impl Setup {
-    /// A machine of which nothing is known: its zero is taken to stand `above` the program's zero, mm, and its tool starts there.
+    /// A machine of which nothing is known: its zero is taken to stand `above` the program's zero, mm, and
+    /// its tool starts there.
     pub fn from_above(above: f64) -> Self {
         let work = [[0.0, 0.0, -above, 0.0, 0.0, 0.0]; WORK_OFFSETS];
         Self { work, offsets_known: false, ..Self::default() }
@@ -187,7 +188,8 @@ impl State {
         self.at = self.frame.program_place(&self.place);
     }
 
-    /// Where the tip is in the program's coordinates, which differs from `at` while the radius is compensated.
+    /// Where the tip is in the program's coordinates, which differs from `at` while the radius is
+    /// compensated.
     pub fn tip(&self) -> Place {
         self.frame.program_place(&self.place)
     }
@@ -201,8 +203,8 @@ impl State {
         self.reframe();
     }
 
-    /// What programs can ask for by a number. Positions that the control knows with the cutter's radius or the tool's length
-    /// in them are not known.
+    /// What programs can ask for by a number. Positions that the control knows with the cutter's radius or
+    /// the tool's length in them are not known.
     pub fn system(&self, number: u32, variables: &Variables, compensated: bool) -> System {
         if variables.is_free(number) {
             return System::Free;

@@ -147,12 +147,12 @@ impl Picture {
     }
 }
 
-/// Pixels whose middle is this near to a line without width are its own; a hair more than a half, so that a line along
-/// the border of two rows is not lost.
+/// Pixels whose middle is this near to a line without width are its own; a hair more than a half, so that a
+/// line along the border of two rows is not lost.
 const NEAREST_PIXEL: f64 = 0.500_001;
 
-/// Lines of one colour over a rectangle of pixels, smooth at their edges: where they meet or cross nothing is laid on
-/// twice.
+/// Lines of one colour over a rectangle of pixels, smooth at their edges: where they meet or cross nothing is
+/// laid on twice.
 #[derive(Debug, Clone)]
 pub struct Strokes {
     width: usize,
@@ -166,8 +166,8 @@ impl Strokes {
         Self { width, height, coverage: vec![0; width * height] }
     }
 
-    /// A line from `a` to `b` (pixels, fractions count; y down) of this width; one of width 0 covers the nearest pixels
-    /// wholly and nothing else.
+    /// A line from `a` to `b` (pixels, fractions count; y down) of this width; one of width 0 covers the
+    /// nearest pixels wholly and nothing else.
     pub fn line(&mut self, a: [f64; 2], b: [f64; 2], width: f64) {
         let reach = 0.5 * width + 0.5;
         let range = |from: f64, to: f64, most: usize| {

@@ -1,5 +1,5 @@
-//! Pictures of what a path was planned by: feed directions, levels of ψ and singular points; and how far passes lie
-//! apart, over what is allowed.
+//! Pictures of what a path was planned by: feed directions, levels of ψ and singular points; and how far
+//! passes lie apart, over what is allowed.
 
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, Strokes, TextSize, distance_to_segment_2d};
 use super::map::{
@@ -31,14 +31,16 @@ const STROKE: f64 = 0.7;
 /// Strokes are drawn for directions at most this far apart, pixels: longer ones show no more.
 const MOST_PITCH: f64 = 40.0;
 
-/// Ends of the key of intervals, over the allowed one. The planner leaves 2 % above; halved intervals are 0.5 and more.
+/// Ends of the key of intervals, over the allowed one. The planner leaves 2 % above; halved intervals are 0.5
+/// and more.
 const NARROWEST: f64 = 0.5;
 const WIDEST: f64 = 1.5;
 
 /// Passes get a line of their own where they are this far apart, pixels.
 const APART: f64 = 6.0;
 
-/// Directions as strokes over levels of ψ, and singular points with their index. `deviation` tells where the part is.
+/// Directions as strokes over levels of ψ, and singular points with their index. `deviation` tells where the
+/// part is.
 pub fn field_picture(
     grid: &Grid,
     deviation: &[f32],
@@ -144,8 +146,8 @@ fn draw_legend(page: &mut Picture, [x, y]: [i64; 2], points: usize) {
     }
 }
 
-/// Passes as wide as what they serve, coloured by the interval to the farther of their neighbours over the allowed one:
-/// red too wide, white as allowed, blue narrower. Grey where no neighbour is near.
+/// Passes as wide as what they serve, coloured by the interval to the farther of their neighbours over the
+/// allowed one: red too wide, white as allowed, blue narrower. Grey where no neighbour is near.
 pub fn interval_picture(
     grid: &Grid,
     deviation: &[f32],
@@ -191,8 +193,8 @@ pub fn interval_picture(
 /// Colour of passes without neighbours.
 const NO_NEIGHBOUR: Rgb = [216, 218, 220];
 
-/// For each pixel of a map the pass point that serves it: squared distance (pixels) and ratio of intervals, NaN if
-/// unknown. A point serves half its interval, or half the allowed one.
+/// For each pixel of a map the pass point that serves it: squared distance (pixels) and ratio of intervals,
+/// NaN if unknown. A point serves half its interval, or half the allowed one.
 fn served(grid: &Grid, map: &Pooled, field: &PlannedField) -> Vec<Option<(f32, f32)>> {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
     let mut served: Vec<Option<(f32, f32)>> = vec![None; width * height];

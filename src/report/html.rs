@@ -27,8 +27,8 @@ pub struct ToolpathPage {
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page. `pages` has one entry for each toolpath of `report` that was measured; `scene` is the scene's
-/// text.
+/// The whole page. `pages` has one entry for each toolpath of `report` that was measured; `scene` is the
+/// scene's text.
 pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> String {
     let body = html! {
         header {
@@ -161,7 +161,8 @@ fn tolerances(report: &RunReport) -> Markup {
     }
 }
 
-/// What each figure is and what the ± behind it bounds: whoever reads the page may never have seen the program.
+/// What each figure is and what the ± behind it bounds: whoever reads the page may never have seen the
+/// program.
 fn meanings(report: &RunReport) -> Markup {
     let mut rows = vec![
         (

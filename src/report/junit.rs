@@ -1,4 +1,5 @@
-//! A run as junit.xml, which services for continuous integration read: a case for each limit of each toolpath.
+//! A run as junit.xml, which services for continuous integration read: a case for each limit of each
+//! toolpath.
 
 use std::fmt::Write as _;
 

@@ -1,6 +1,7 @@
 //! Pictures of maps over a grid: title, map with axes, scale bar, colour key. y points up.
 //!
-//! Each picture is drawn twice, large for its file and small for the page. A picture that is shrunk has blurred letters.
+//! Each picture is drawn twice, large for its file and small for the page. A picture that is shrunk has
+//! blurred letters.
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};

@@ -39,7 +39,8 @@ const DISC: i64 = 5;
 /// Passes begin and end beyond the part; the map shows as much as this share of its longer side around it.
 const MOST_AROUND: f64 = 0.25;
 
-/// Draws lines over the part and around it, as far as they go on the surface. `deviation` tells where the part is.
+/// Draws lines over the part and around it, as far as they go on the surface. `deviation` tells where the
+/// part is.
 pub fn path_picture(
     grid: &Grid,
     deviation: &[f32],

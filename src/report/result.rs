@@ -59,8 +59,8 @@ pub struct ToolpathResult {
     pub stock_is_previous: bool,
     /// Whether every limit holds.
     pub verdict: Verdict,
-    /// Every limit with the figure that was held against it, the gravest first. report.json has them as `violations`,
-    /// `undecided` and `held`.
+    /// Every limit with the figure that was held against it, the gravest first. report.json has them as
+    /// `violations`, `undecided` and `held`.
     #[serde(flatten, serialize_with = "by_verdict")]
     pub claims: Vec<Claim>,
     /// What planner and program have to say.
@@ -92,7 +92,8 @@ impl ToolpathResult {
         self.claims.iter().filter(move |claim| claim.verdict() == verdict)
     }
 
-    /// The deepest cut and its bound, mm: into the surface or, in a pocket, beyond its walls, which have a limit of their own.
+    /// The deepest cut and its bound, mm: into the surface or, in a pocket, beyond its walls, which have a
+    /// limit of their own.
     pub fn deepest_cut(&self) -> [f64; 2] {
         let walls = self.claims.iter().filter(|claim| claim.what == WALL);
         let mut all: Vec<[f64; 2]> =
@@ -102,7 +103,8 @@ impl ToolpathResult {
         [deepest, all.iter().map(|cut| (cut[0] - deepest) + cut[1]).fold(0.0, f64::max)]
     }
 
-    /// What share of the surface the verdict covers, in words to stand behind it; empty where that is all of it.
+    /// What share of the surface the verdict covers, in words to stand behind it; empty where that is all of
+    /// it.
     pub fn scope(&self) -> &str {
         let coverage = self.figures.iter().find(|figure| figure.key == "coverage");
         coverage.and_then(|figure| figure.value.get("scope")?.as_str()).unwrap_or_default()

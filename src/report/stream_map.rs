@@ -1,5 +1,5 @@
-//! The function whose levels passes are, as a surface seen aslant: each level at the height of its value, coloured by how dense passes are
-//! there.
+//! The function whose levels passes are, as a surface seen aslant: each level at the height of its value,
+//! coloured by how dense passes are there.
 
 use super::canvas::{Align, FAINT_INK, INK, Picture, Strokes, TextSize};
 use super::map::{Key, MapSize, MapWords, Pooled, extremes, write_title};
@@ -62,7 +62,8 @@ pub fn stream_picture(field: &PlannedField, words: &MapWords<'_>, size: MapSize)
     page
 }
 
-/// The frame of the plan view at the least ψ with round positions along x and y, and values of ψ up its left corner.
+/// The frame of the plan view at the least ψ with round positions along x and y, and values of ψ up its left
+/// corner.
 fn draw_axes(page: &mut Picture, view: &View, [right, up]: [&str; 2]) {
     const PIXELS_A_TICK: f64 = 60.0;
     const TICK: f64 = 6.0;
@@ -80,7 +81,8 @@ fn draw_axes(page: &mut Picture, view: &View, [right, up]: [&str; 2]) {
     let top = place(x[0], y[0], psi[1]);
     line(base[0], top);
     let mut words = Vec::new();
-    // Round values from one end of an axis to the other, with the way from their place to the number's and what is its end there.
+    // Round values from one end of an axis to the other, with the way from their place to the number's and
+    // what is its end there.
     let mut axis = |range: [f64; 2], at: &dyn Fn(f64) -> [f64; 2], aside: [f64; 2], align: Align| {
         let [from, to] = range.map(at);
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);

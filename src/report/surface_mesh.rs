@@ -1,14 +1,14 @@
-//! The cut stock as a closed triangle mesh, fine where the surface bends, coarse where it is flat,
-//! with its ridges along edges.
+//! The cut stock as a closed triangle mesh, fine where the surface bends, coarse where it is flat, with its
+//! ridges along edges.
 //!
 //! Enters: the cut map, and the cutters and path that cut it. Leaves: vertices in mm, triangles
-//! counter-clockwise seen from outside. The top is a hierarchy of right triangles over the cell
-//! centres ([`network`]). Where two neighbouring centres were cut by different passes, the cuts are
-//! brought to intersection in closed form ([`ridge_points`]), and a side that crosses such a ridge is
-//! divided at it, so that ridges keep their heights and run straight instead of along the cells.
+//! counter-clockwise seen from outside. The top is a hierarchy of right triangles over the cell centres
+//! ([`network`]). Where two neighbouring centres were cut by different passes, the cuts are brought to
+//! intersection in closed form ([`ridge_points`]), and a side that crosses such a ridge is divided at it, so
+//! that ridges keep their heights and run straight instead of along the cells.
 //!
-//! Triangles along the cells would miss the ridges between them. With ridges along edges the same number of triangles lies
-//! closer to the cut surface.
+//! Triangles along the cells would miss the ridges between them. With ridges along edges the same number of
+//! triangles lies closer to the cut surface.
 
 mod network;
 mod ridge_points;

@@ -1,5 +1,6 @@
-//! Ridges over machining time, where toolpaths were planned for equal times: a table, and its plot as SVG. Whoever is lower at the
-//! same time is smoother; whoever is farther to the left at the same height is faster.
+//! Ridges over machining time, where toolpaths were planned for equal times: a table, and its plot as SVG.
+//! Whoever is lower at the same time is smoother; whoever is farther to the left at the same height is
+//! faster.
 
 use maud::{Markup, PreEscaped, html};
 use plotters::coord::Shift;

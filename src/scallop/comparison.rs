@@ -1,10 +1,11 @@
-//! What the short cuts cost: the second-order formula and the polynomial section against the exact scallop, over curvature
-//! and step.
+//! What the short cuts cost: the second-order formula and the polynomial section against the exact scallop,
+//! over curvature and step.
 //!
-//! The surface is a plane or a cylinder of curvature κ. One pass runs along its ruling, its neighbours are turned against
-//! it, each by one angle more than the one before, as passes that spread like a fan. Neighbours come nearest to the first
-//! contact one step apart. What is exact then stands in the section across the first pass: the place where the cut of the
-//! neighbour, swept along its track, meets the circle of the first, and its distance from the cylinder.
+//! The surface is a plane or a cylinder of curvature κ. One pass runs along its ruling, its neighbours are
+//! turned against it, each by one angle more than the one before, as passes that spread like a fan.
+//! Neighbours come nearest to the first contact one step apart. What is exact then stands in the section
+//! across the first pass: the place where the cut of the neighbour, swept along its track, meets the circle
+//! of the first, and its distance from the cylinder.
 
 use super::{BallSection, ScallopError, SectionFrame, fit_section};
 use geometry::{Point3, Vector3};
@@ -29,12 +30,13 @@ pub struct Comparison {
     pub second_order: f64,
     /// Error of the polynomial section there, as a share of it.
     pub parallel: f64,
-    /// Error of the polynomial section between passes that spread, as a share of the exact height in the section.
+    /// Error of the polynomial section between passes that spread, as a share of the exact height in the
+    /// section.
     pub spreading: f64,
 }
 
-/// Compares for a ball of radius `r`, mm: for each curvature and step, with neighbours turned by `angle` (rad) and a
-/// polynomial of `degree`. Steps at which the balls do not meet are left out.
+/// Compares for a ball of radius `r`, mm: for each curvature and step, with neighbours turned by `angle`
+/// (rad) and a polynomial of `degree`. Steps at which the balls do not meet are left out.
 ///
 /// # Errors
 /// [`ScallopError`] for a radius, curvature or degree that is none, or an angle beyond a quarter of a turn.
@@ -109,7 +111,8 @@ impl Fan {
         fit_section(frame, &contacts, degree)?.scallop(&pair, self.section.radius())
     }
 
-    /// In the section of the first contact: on the circle of the first pass, where the track of the next comes as near.
+    /// In the section of the first contact: on the circle of the first pass, where the track of the next
+    /// comes as near.
     fn exact(&self) -> Option<f64> {
         let r = self.section.radius();
         let on_circle = |turn: f64| Point3::new(0.0, r * turn.sin(), r - r * turn.cos());
@@ -179,7 +182,8 @@ mod tests {
         assert!(without.iter().all(|row| (row.spreading - row.parallel).abs() < 1e-9), "{without:?}");
     }
 
-    /// On a plane the section sees the neighbour cos β nearer than it is, and its track square to the section.
+    /// On a plane the section sees the neighbour cos β nearer than it is, and its track square to the
+    /// section.
     #[test]
     fn on_a_plane_the_error_of_spreading_passes_is_that_of_the_closed_form() {
         let (r, s, angle) = (5.0f64, 0.6f64, 10f64.to_radians());

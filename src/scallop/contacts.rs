@@ -2,9 +2,9 @@
 
 use geometry::{Point3, Vector3};
 
-/// The top of the ridge, mm, between balls of radius `r` around two centres, on their side against `outward` (a unit vector out of
-/// the material): `K = (C₁+C₂)/2 − √(r² − d²/4) ŵ`, `ŵ` square to `C₁C₂`. `None` where they do not meet, or stand over each
-/// other.
+/// The top of the ridge, mm, between balls of radius `r` around two centres, on their side against `outward`
+/// (a unit vector out of the material): `K = (C₁+C₂)/2 − √(r² − d²/4) ŵ`, `ŵ` square to `C₁C₂`. `None` where
+/// they do not meet, or stand over each other.
 pub fn ridge_between(centres: [Point3; 2], r: f64, outward: &Vector3) -> Option<Point3> {
     let [a, b] = centres;
     let (middle, half) = (nalgebra::center(&a, &b), 0.5 * (b - a));

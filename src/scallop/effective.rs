@@ -5,18 +5,18 @@ use cutter::Cutter;
 use geometry::Vector3;
 use motion::in_tool_frame;
 
-/// Radius, mm, with which the cutter bends across the feed at a contact: outward surface normal `normal`, tangent `across`
-/// the feed, tool axis `axis`, all unit. A ball's radius; `rc + (R − rc)/sin λ` for a torus that leads by λ, `R/sin λ` for a
-/// flat.
+/// Radius, mm, with which the cutter bends across the feed at a contact: outward surface normal `normal`,
+/// tangent `across` the feed, tool axis `axis`, all unit. A ball's radius; `rc + (R − rc)/sin λ` for a torus
+/// that leads by λ, `R/sin λ` for a flat.
 ///
 /// # Errors
-/// [`ScallopError::Cutter`] where a flat or a cone lies on the surface, which leaves no scallop by itself, or a point
-/// touches, which leaves grooves.
+/// [`ScallopError::Cutter`] where a flat or a cone lies on the surface, which leaves no scallop by itself, or
+/// a point touches, which leaves grooves.
 ///
 /// # Tolerance
-/// Exact for a ball. Of others it is the circle that osculates: a flat that leads by λ shows an ellipse with half axes R
-/// and R sin λ, whose scallop between passes `s` apart on a plane is higher by the share `s²/(16R²)`, less what the circle
-/// itself misses.
+/// Exact for a ball. Of others it is the circle that osculates: a flat that leads by λ shows an ellipse with
+/// half axes R and R sin λ, whose scallop between passes `s` apart on a plane is higher by the share
+/// `s²/(16R²)`, less what the circle itself misses.
 pub fn effective_radius(
     cutter: &Cutter,
     axis: &Vector3,

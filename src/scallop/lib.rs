@@ -1,12 +1,12 @@
 //! Scallops by calculation: what a ridge between two passes of a ball will be, before anything is cut.
 //!
-//! Enters: the cutter's radius, the curvature of the surface across the feed, and a step or a height; or the contacts of
-//! two passes. Leaves: the exact height and the exact step, and what two common simplifications make of them: the
-//! second-order formula, and a polynomial fitted to the section across the feed. Lengths
+//! Enters: the cutter's radius, the curvature of the surface across the feed, and a step or a height; or the
+//! contacts of two passes. Leaves: the exact height and the exact step, and what two common simplifications
+//! make of them: the second-order formula, and a polynomial fitted to the section across the feed. Lengths
 //! mm, curvature 1/mm, positive where the surface is concave toward its outward normal.
 //!
-//! Calculated heights are predictions. Verdicts rest on what is measured on the cut surface; `metrology` puts both side
-//! by side.
+//! Calculated heights are predictions. Verdicts rest on what is measured on the cut surface; `metrology` puts
+//! both side by side.
 
 mod comparison;
 mod contacts;

@@ -21,8 +21,9 @@ impl<'a> SurfaceCurvature<'a> {
     /// [`MeshFieldError`] when the triangles of a mesh make no surface.
     ///
     /// # Tolerance
-    /// Exact on patches. On a mesh a quadratic is fitted to the vertices of the smooth sheet around: of first order in the
-    /// length of its edges, better on regular ones; a face with too few vertices around counts as flat.
+    /// Exact on patches. On a mesh a quadratic is fitted to the vertices of the smooth sheet around: of first
+    /// order in the length of its edges, better on regular ones; a face with too few vertices around counts
+    /// as flat.
     pub fn of(part: &'a Part, radius: f64) -> Result<Self, MeshFieldError> {
         let fitted = || Ok(Sheets::of(&FieldMesh::of_mesh(part.mesh())?, FIT_OVER_RADIUS * radius));
         let sheets = part.patches().is_empty().then(fitted).transpose()?;
@@ -34,8 +35,8 @@ impl<'a> SurfaceCurvature<'a> {
         self.sheets.is_some()
     }
 
-    /// Normal curvature at a surface point in the tangent direction `along` (unit), 1/mm, positive concave; `None` at a
-    /// pole.
+    /// Normal curvature at a surface point in the tangent direction `along` (unit), 1/mm, positive concave;
+    /// `None` at a pole.
     pub fn along(&self, at: &SurfacePoint, along: &Vector3) -> Option<f64> {
         match (&self.sheets, at.at) {
             (Some(sheets), _) => {

@@ -1,22 +1,22 @@
 //! Ball and circular section: height from step, step from height, both ways exact.
 //!
 //! Across the feed the surface is a circle of curvature κ (a line where κ = 0) and the ball's centres stand
-//! `(1 − κr)/κ` from its middle. The law of cosines in the triangle of that middle, a ball's centre and the ridge gives,
-//! with `g = (2/κ · sin(κs/4))²` for the arc `s`,
+//! `(1 − κr)/κ` from its middle. The law of cosines in the triangle of that middle, a ball's centre and the
+//! ridge gives, with `g = (2/κ · sin(κs/4))²` for the arc `s`,
 //!
 //! ```text
 //! h (2r − h) = (1 − κr)(1 − κh) g
 //! ```
 //!
-//! a quadratic in `h` and linear in `g`. Nothing in it cancels as κ goes to zero, where `g = s²/4`, so one form serves flat,
-//! convex and concave sections. It is the same as `h = σ[(ρ+σr)cos(θ/2) − ρ] − √(r² − (ρ+σr)² sin²(θ/2))`, which loses
-//! as many digits as ρ is longer than h.
+//! a quadratic in `h` and linear in `g`. Nothing in it cancels as κ goes to zero, where `g = s²/4`, so one
+//! form serves flat, convex and concave sections. It is the same as
+//! `h = σ[(ρ+σr)cos(θ/2) − ρ] − √(r² − (ρ+σr)² sin²(θ/2))`, which loses as many digits as ρ is longer than h.
 
 use super::ScallopError;
 use super::error::positive;
 
-/// Sections of less curvature times radius than this share below one count as not fitting: the ball's centres would
-/// then all stand in one place.
+/// Sections of less curvature times radius than this share below one count as not fitting: the ball's centres
+/// would then all stand in one place.
 const LEAST_ROOM: f64 = 1e-9;
 
 /// A ball on a circular section across the feed.
@@ -35,8 +35,8 @@ pub struct ScallopStep {
     pub arc: f64,
     /// Between the contacts, mm.
     pub chord: f64,
-    /// True where any step leaves less than the height, since the section is nearly as concave as the ball; the step is
-    /// then half of its circle.
+    /// True where any step leaves less than the height, since the section is nearly as concave as the ball;
+    /// the step is then half of its circle.
     pub limited: bool,
 }
 
@@ -44,8 +44,8 @@ impl BallSection {
     /// A ball of radius `radius`, mm, on a section of curvature `curvature`, 1/mm, positive concave.
     ///
     /// # Errors
-    /// [`ScallopError::Range`] for numbers that are none; [`ScallopError::DoesNotFit`] where the section is as concave as
-    /// the ball or more.
+    /// [`ScallopError::Range`] for numbers that are none; [`ScallopError::DoesNotFit`] where the section is
+    /// as concave as the ball or more.
     pub fn new(radius: f64, curvature: f64) -> Result<Self, ScallopError> {
         positive("the radius of the ball", radius)?;
         if !curvature.is_finite() {
@@ -114,8 +114,8 @@ impl BallSection {
         positive("the scallop height", height)?;
         let highest = self.greatest_height();
         if height > highest * (1.0 + 1e-12) {
-            // On a concave section of more than the ball's diameter there is a highest ridge; on a narrower one every
-            // step up to half a circle leaves less.
+            // On a concave section of more than the ball's diameter there is a highest ridge; on a narrower
+            // one every step up to half a circle leaves less.
             return if 2.0 * self.curvature * self.radius > 1.0 {
                 Ok(ScallopStep { limited: true, ..self.greatest_step() })
             } else {
@@ -179,8 +179,9 @@ fn sine_over(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
 }
 
-/// Exact scallop height, mm, of a ball of radius `r` between two passes an arc `s` apart on a circular section of
-/// curvature `kappa` (1/mm, positive concave); `None` when the ball does not reach across or does not fit.
+/// Exact scallop height, mm, of a ball of radius `r` between two passes an arc `s` apart on a circular
+/// section of curvature `kappa` (1/mm, positive concave); `None` when the ball does not reach across or does
+/// not fit.
 pub fn ball_scallop_height(r: f64, kappa: f64, s: f64) -> Option<f64> {
     BallSection::new(r, kappa).and_then(|section| section.height(s)).ok()
 }

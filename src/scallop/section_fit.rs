@@ -1,14 +1,14 @@
-//! The section across the feed as a polynomial, and the scallop measured to it: how a scallop is calculated from path
-//! points alone, with no surface at hand.
+//! The section across the feed as a polynomial, and the scallop measured to it: how a scallop is calculated
+//! from path points alone, with no surface at hand.
 //!
-//! The plane across the feed at a contact is the section. Contacts of neighbouring passes are projected into it, a
-//! polynomial is fitted to them, two circles with the cutter's radius stand around the cutter locations of two passes (each
-//! its contact plus the radius along the surface normal in the section), and the distance of their meeting from the
-//! polynomial is the height.
+//! The plane across the feed at a contact is the section. Contacts of neighbouring passes are projected into
+//! it, a polynomial is fitted to them, two circles with the cutter's radius stand around the cutter locations
+//! of two passes (each its contact plus the radius along the surface normal in the section), and the distance
+//! of their meeting from the polynomial is the height.
 //!
-//! Where tracks are parallel and the surface bends across them only, that is exact but for the fit. Elsewhere the neighbour's
-//! contact lies before or behind the section and is taken for a point of it, its pass crosses the section at an angle and is
-//! taken for a circle: what that costs is told by [`super::compare`].
+//! Where tracks are parallel and the surface bends across them only, that is exact but for the fit. Elsewhere
+//! the neighbour's contact lies before or behind the section and is taken for a point of it, its pass crosses
+//! the section at an angle and is taken for a circle: what that costs is told by [`super::compare`].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,9 +16,9 @@ use super::ScallopError;
 use geometry::{Point2, Point3, Vector2, Vector3};
 use motion::CcPoint;
 
-/// Degree of the polynomial where none is asked for. On circles seen by three passes on either side it errs by less than
-/// 0.2 % of the height while three steps are below 0.4 of the circle's radius; a parabola and a cubic by ten times as much and
-/// more, and the fifth degree by no less.
+/// Degree of the polynomial where none is asked for. On circles seen by three passes on either side it errs
+/// by less than 0.2 % of the height while three steps are below 0.4 of the circle's radius; a parabola and a
+/// cubic by ten times as much and more, and the fifth degree by no less.
 pub const DEFAULT_DEGREE: usize = 4;
 
 /// Greatest degree: beyond, contacts within a few steps no longer tell the coefficients apart.
@@ -66,8 +66,8 @@ pub struct SectionFit {
 /// Fits a polynomial of `degree` to contacts seen along the feed, by least squares.
 ///
 /// # Errors
-/// [`ScallopError::Range`] for a degree that is none; [`ScallopError::Fit`] for fewer distinct places across the feed than
-/// the degree and one.
+/// [`ScallopError::Range`] for a degree that is none; [`ScallopError::Fit`] for fewer distinct places across
+/// the feed than the degree and one.
 pub fn fit_section(
     frame: SectionFrame,
     contacts: &[CcPoint],
@@ -100,8 +100,8 @@ pub fn fit_section(
 }
 
 impl SectionFit {
-    /// Height of the polynomial over the tangent plane, mm, its slope, and its second derivative, 1/mm, `x` mm across the
-    /// feed.
+    /// Height of the polynomial over the tangent plane, mm, its slope, and its second derivative, 1/mm, `x`
+    /// mm across the feed.
     pub fn jet(&self, x: f64) -> [f64; 3] {
         let t = x / self.scale;
         let horner = |[p, d, dd]: [f64; 3], c: &f64| [p * t + c, d * t + p, dd * t + 2.0 * d];
@@ -126,8 +126,8 @@ impl SectionFit {
         ((at.y - p) - (at.x - x) * d) / (1.0 + d * d).sqrt()
     }
 
-    /// Scallop height, mm, between two contacts of a ball of radius `r`, mm: circles around their cutter locations in the
-    /// section, measured to the polynomial.
+    /// Scallop height, mm, between two contacts of a ball of radius `r`, mm: circles around their cutter
+    /// locations in the section, measured to the polynomial.
     ///
     /// # Errors
     /// [`ScallopError::Apart`] where the circles do not meet, or a contact's normal lies along the feed.

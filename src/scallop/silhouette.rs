@@ -1,18 +1,20 @@
 //! The outline of a cutter seen along the feed, and where it stands a given height over the surface.
 //!
-//! A cutter that is fed straight on leaves a groove with the outline of its shadow. That outline is convex, and each of its
-//! places is the one where the cutter's surface has the place's normal `d(φ) = sin φ·b − cos φ·n`: φ turns from the contact
-//! (0) toward `b`, across the feed. In the frame of contact, `x` along `b` and `y` along the normal,
+//! A cutter that is fed straight on leaves a groove with the outline of its shadow. That outline is convex,
+//! and each of its places is the one where the cutter's surface has the place's normal
+//! `d(φ) = sin φ·b − cos φ·n`: φ turns from the contact (0) toward `b`, across the feed. In the frame of
+//! contact, `x` along `b` and `y` along the normal,
 //!
 //! ```text
 //! P(φ) = (p·b, p·n),   P′(φ) = ϱ(φ) (cos φ, sin φ),   ϱ = r (1 − q²) + (ρ/sin λ) q²
 //! ```
 //!
-//! with p the place of the profile of slope λ, at ρ from the axis, r the radius of its arc and q the share of the outline's
-//! tangent along the parallel (Blaschke: radii of curvature of a shadow are those of the support along it). A place stands
-//! `h` over a surface of curvature κ across the feed where `y = h + κ (x² + y² − h²)/2`; nothing in that cancels as κ goes
-//! to zero. Cones and discs are jumps of P, edges are stretches of φ without one: the bracket closes around a jump, and what
-//! crosses it is a straight line.
+//! with p the place of the profile of slope λ, at ρ from the axis, r the radius of its arc and q the share of
+//! the outline's tangent along the parallel (Blaschke: radii of curvature of a shadow are those of the
+//! support along it). A place stands `h` over a surface of curvature κ across the feed where
+//! `y = h + κ (x² + y² − h²)/2`; nothing in that cancels as κ goes to zero. Cones and discs are jumps of P,
+//! edges are stretches of φ without one: the bracket closes around a jump, and what crosses it is a straight
+//! line.
 
 use cutter::{Cutter, Profile};
 use geometry::Vector3;
@@ -23,7 +25,8 @@ const MOST_STEPS: usize = 60;
 /// φ is found where the height is off by less than this share of the wanted one.
 const PRECISION: f64 = 1e-11;
 
-/// A bracket of φ narrower than this, rad, holds a jump or an edge; the chord across it lies inside the outline.
+/// A bracket of φ narrower than this, rad, holds a jump or an edge; the chord across it lies inside the
+/// outline.
 const NARROW: f64 = 1e-11;
 
 /// The outline's radius of curvature at the contact is found after this share of the greatest turn.
@@ -88,21 +91,23 @@ impl Over {
 }
 
 impl<'a> Silhouette<'a> {
-    /// Of a cutter at a contact with outward normal `n`, seen square to `b`, both unit and in the frame of the tool.
+    /// Of a cutter at a contact with outward normal `n`, seen square to `b`, both unit and in the frame of
+    /// the tool.
     pub fn new(cutter: &'a Cutter, n: Vector3, b: Vector3) -> Self {
         let mut outline = Self { profile: cutter.profile(), n, b, contact: Vector3::zeros() };
         outline.contact = outline.place(&-n).0;
         outline
     }
 
-    /// How far apart passes may lie on the surface so that their ridge stands no higher than asked, mm; infinite where the
-    /// ridge does not rise to it within reach.
+    /// How far apart passes may lie on the surface so that their ridge stands no higher than asked, mm;
+    /// infinite where the ridge does not rise to it within reach.
     pub fn width(&self, over: &Over) -> f64 {
         let other = Self { b: -self.b, ..*self };
         self.reach(over) + other.reach(over)
     }
 
-    /// The place of the cutter with the outward normal `d`, and its radii of curvature along the meridian and the parallel.
+    /// The place of the cutter with the outward normal `d`, and its radii of curvature along the meridian and
+    /// the parallel.
     fn place(&self, d: &Vector3) -> (Vector3, [f64; 2]) {
         let profile = self.profile;
         let sine = (d.x * d.x + d.y * d.y).sqrt().min(1.0);
@@ -145,7 +150,8 @@ impl<'a> Silhouette<'a> {
         let (mut low, mut top) = (0.0, upright.min(std::f64::consts::FRAC_PI_2));
         let (mut below, mut above) = (OnOutline { x: 0.0, y: 0.0, bend: 0.0 }, self.at(top));
         if !high(&above) {
-            // Where the side leans back over the surface, the widest place of the outline is the last to leave a ridge.
+            // Where the side leans back over the surface, the widest place of the outline is the last to
+            // leave a ridge.
             return if upright > top { over.arc(&above) } else { self.up_the_side(over, &above) };
         }
         // A flat at the contact is behind the cutter's first turn.
@@ -208,8 +214,8 @@ impl OnOutline {
     }
 }
 
-/// Where the chord from a place below the height to one above, or beyond, first reaches it: it lies inside the outline, so that the
-/// way is never too long.
+/// Where the chord from a place below the height to one above, or beyond, first reaches it: it lies inside
+/// the outline, so that the way is never too long.
 fn between(over: &Over, below: &OnOutline, above: &OnOutline) -> Option<OnOutline> {
     let chord = [above.x - below.x, above.y - below.y];
     below.along(chord, over).filter(|p| p.x <= above.x)

@@ -1,21 +1,24 @@
-//! Strip width: how far apart neighbouring passes may lie at a point of the surface so that the
-//! ridge between them stays below a scallop height.
+//! Strip width: how far apart neighbouring passes may lie at a point of the surface so that the ridge between
+//! them stays below a scallop height.
 //!
-//! Cutter and surface are compared where the cutter cuts. Between them stands `½ (K − B)(x − s t)`, a quadratic form of the place
-//! `x` less the contact `s t` along the feed, K and B the second fundamental forms of cutter and surface. The least over all
-//! contacts is what a pass leaves at a distance y across the feed:
+//! Cutter and surface are compared where the cutter cuts. Between them stands `½ (K − B)(x − s t)`, a
+//! quadratic form of the place `x` less the contact `s t` along the feed, K and B the second fundamental
+//! forms of cutter and surface. The least over all contacts is what a pass leaves at a distance y across the
+//! feed:
 //!
 //! ```text
 //! ½ gap y²,   gap = G_bb − G_tb²/G_tt,   G = K − B
 //! ```
 //!
-//! with t along the feed and b across. A ridge of height `h` stands, to second order, between passes `√(8h / gap)` apart. The
-//! term with `G_tb` is the twist: where the surface twists along the feed, the cutter cuts ahead of or behind its contact, and passes
-//! of a ball may lie farther apart than the section across the feed tells.
+//! with t along the feed and b across. A ridge of height `h` stands, to second order, between passes
+//! `√(8h / gap)` apart. The term with `G_tb` is the twist: where the surface twists along the feed, the
+//! cutter cuts ahead of or behind its contact, and passes of a ball may lie farther apart than the section
+//! across the feed tells.
 //!
-//! Beyond the second order a ball and a surface that do not twist are two circles ([`BallSection`]), which is exact. Other cutters
-//! show an outline along the feed, exact where the feed is straight and the tool turns with the surface: on planes, and along
-//! cylinders under a lead and tilt. What the twist adds counts as curvature of the surface across the feed.
+//! Beyond the second order a ball and a surface that do not twist are two circles ([`BallSection`]), which is
+//! exact. Other cutters show an outline along the feed, exact where the feed is straight and the tool turns
+//! with the surface: on planes, and along cylinders under a lead and tilt. What the twist adds counts as
+//! curvature of the surface across the feed.
 //!
 //! Where the curvature changes over a strip, what really stands is measured on the cut surface.
 
@@ -24,9 +27,9 @@ use super::silhouette::{Over, Silhouette};
 use cutter::Cutter;
 use geometry::Vector3;
 
-/// The strip is never planned wider than this multiple of the strip on a plane, of the cutter or of a ball as wide. Where the surface
-/// is nearly as concave as the cutter the width grows without bound, and with it the part of the surface over which its
-/// curvature would have to stay the same.
+/// The strip is never planned wider than this multiple of the strip on a plane, of the cutter or of a ball as
+/// wide. Where the surface is nearly as concave as the cutter the width grows without bound, and with it the
+/// part of the surface over which its curvature would have to stay the same.
 const WIDEST_OVER_PLANE: f64 = 2.5;
 
 /// Widest share of the cutter's diameter that a strip is planned by (flat ends on flat ground).
@@ -36,7 +39,8 @@ const WIDEST_OVER_DIAMETER: f64 = 0.8;
 /// less, is left between them.
 const NEARLY_AS_CONCAVE: f64 = 0.25;
 
-/// Where a cutter hugs the surface along the feed, the form says little about places so many times farther ahead than aside.
+/// Where a cutter hugs the surface along the feed, the form says little about places so many times farther
+/// ahead than aside.
 const MOST_ASKEW: f64 = 3.0;
 
 /// How a surface bends at a contact, 1/mm, positive where it is concave toward its normal.
@@ -70,8 +74,8 @@ impl FeedCurvature {
     }
 }
 
-/// How far ahead of its contact the cutter cuts for each mm across the feed: there it stands least above the surface, of all
-/// places of the pass; arguments as of [`strip_width_at`].
+/// How far ahead of its contact the cutter cuts for each mm across the feed: there it stands least above the
+/// surface, of all places of the pass; arguments as of [`strip_width_at`].
 pub fn cut_ahead(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: &FeedCurvature) -> f64 {
     gap(&bend_of(cutter, n, b), surface).ahead()
 }
@@ -99,7 +103,8 @@ fn gap(cutter: &FeedCurvature, surface: &FeedCurvature) -> FeedCurvature {
     }
 }
 
-/// The curvature across the feed that a surface without twist has where a cutter with this bend leaves as much.
+/// The curvature across the feed that a surface without twist has where a cutter with this bend leaves as
+/// much.
 fn untwisted(cutter: &FeedCurvature, surface: &FeedCurvature) -> f64 {
     let gap = gap(cutter, surface);
     if gap.twist == 0.0 || !gap.across.is_finite() {
@@ -109,12 +114,14 @@ fn untwisted(cutter: &FeedCurvature, surface: &FeedCurvature) -> f64 {
     cutter.at(cutter.ahead()) - gap.at(gap.ahead())
 }
 
-/// Width of the strip, mm along the surface, that a cutter leaves below the scallop height `h` around a contact with
-/// outward surface normal `n`, across the feed in the tangent direction `b` (both unit, in the frame of the tool), where the
-/// part bends as `surface`; and whether the surface is so concave that the width had to be limited.
+/// Width of the strip, mm along the surface, that a cutter leaves below the scallop height `h` around a
+/// contact with outward surface normal `n`, across the feed in the tangent direction `b` (both unit, in the
+/// frame of the tool), where the part bends as `surface`; and whether the surface is so concave that the
+/// width had to be limited.
 ///
 /// # Tolerance
-/// A few rounding errors for a ball where nothing twists; 1e-9 of the width for the outline of another cutter, never more than it.
+/// A few rounding errors for a ball where nothing twists; 1e-9 of the width for the outline of another
+/// cutter, never more than it.
 pub fn strip_width_at(
     cutter: &Cutter,
     n: &Vector3,
@@ -125,7 +132,8 @@ pub fn strip_width_at(
     width_within(WIDEST_OVER_DIAMETER * 2.0 * cutter.radius(), cutter, n, b, surface, h)
 }
 
-/// As [`strip_width_at`], also where flat ends on flat ground leave nothing until their strips part: no path has a wider one.
+/// As [`strip_width_at`], also where flat ends on flat ground leave nothing until their strips part: no path
+/// has a wider one.
 pub fn widest_strip_at(
     cutter: &Cutter,
     n: &Vector3,
@@ -177,10 +185,10 @@ fn width_within(
     if width < widest { (width, false) } else { (widest, too_concave) }
 }
 
-/// Width of the strip, mm along the surface, for scallop height `h` where the cutter is a circle of curvature `cutter` and
-/// the surface one of curvature `surface` across the feed (1/mm, positive concave), limited for a cutter of radius
-/// `radius`. The second value is true where the limit acted: the surface is as concave as the
-/// cutter, or more.
+/// Width of the strip, mm along the surface, for scallop height `h` where the cutter is a circle of curvature
+/// `cutter` and the surface one of curvature `surface` across the feed (1/mm, positive concave), limited for
+/// a cutter of radius `radius`. The second value is true where the limit acted: the surface is as concave as
+/// the cutter, or more.
 pub fn strip_width(cutter: f64, surface: f64, h: f64, radius: f64) -> (f64, bool) {
     let widest = widest(h, radius);
     let circle = (cutter > 0.0).then(|| BallSection::new(1.0 / cutter, surface).ok()).flatten();
@@ -210,7 +218,8 @@ mod tests {
         FeedCurvature { across, ..FeedCurvature::default() }
     }
 
-    /// A bull nose on a steep hollow that bends across the feed nearly as it does: its outline turns back before it is as high as asked.
+    /// A bull nose on a steep hollow that bends across the feed nearly as it does: its outline turns back
+    /// before it is as high as asked.
     #[test]
     fn strips_have_a_width_where_the_outline_turns_back() {
         let bull = Cutter::bull(2.0, 1.0 / 3.0).unwrap();
@@ -220,8 +229,8 @@ mod tests {
         assert!(width > 0.1 && width < 1.0, "{width}");
     }
 
-    /// Passes over `z = 0.35 x + 0.1 y + c x y` with contacts at constant y, one at 0 and one so that they are `width` apart
-    /// on the surface at x = 0: the ridge between them over its normal, by brute force.
+    /// Passes over `z = 0.35 x + 0.1 y + c x y` with contacts at constant y, one at 0 and one so that they
+    /// are `width` apart on the surface at x = 0: the ridge between them over its normal, by brute force.
     fn ridge_over_twist(cutter: &Cutter, c: f64, y: f64) -> f64 {
         let z = |x: f64, y: f64| 0.35 * x + 0.1 * y + c * x * y;
         let normal = |x: f64, y: f64| Vector3::new(-0.35 - c * y, -0.1 - c * x, 1.0).normalize();
@@ -254,7 +263,8 @@ mod tests {
         left(0.5 * (low + high))
     }
 
-    /// By the section across the feed alone, ridges of the ball are lower than asked, and those of the bull nose higher.
+    /// By the section across the feed alone, ridges of the ball are lower than asked, and those of the bull
+    /// nose higher.
     #[test]
     fn strips_are_as_wide_as_a_twisted_surface_lets_them_be() {
         let h = 1e-3;
@@ -291,7 +301,8 @@ mod tests {
         }
         assert!(strip_width(0.2, 0.25, 0.01, 5.0).1, "concave beyond the ball: limited, and said so");
         assert!(!strip_width(0.0, 0.0, 0.01, 5.0).1, "a flat end on a plane is limited, but not by the part");
-        // On level ground flats part where their strips do; on a slope of one degree the rim is an arc of r/sin 1°.
+        // On level ground flats part where their strips do; on a slope of one degree the rim is an arc of
+        // r/sin 1°.
         let (flat, bull, h) = (Cutter::flat(20.0).unwrap(), Cutter::bull(20.0, 2.0).unwrap(), 0.01);
         let [level, slope] = [0.0f64, 1.0]
             .map(|degrees| Vector3::new(-degrees.to_radians().sin(), 0.0, degrees.to_radians().cos()));
@@ -333,8 +344,8 @@ mod tests {
         assert!((width / groove - 1.0).abs() < 1e-9, "{width} {groove}");
     }
 
-    /// The lower outline of a cutter seen along the feed, by brute force: the hull of many places of its surface, x across
-    /// the feed and y over the contact, from left to right.
+    /// The lower outline of a cutter seen along the feed, by brute force: the hull of many places of its
+    /// surface, x across the feed and y over the contact, from left to right.
     fn outline(cutter: &Cutter, n: &Vector3, b: &Vector3) -> Vec<[f64; 2]> {
         const PARTS: usize = 1200;
         let mut places = Vec::new();
@@ -369,8 +380,8 @@ mod tests {
         hull.into_iter().map(|p| [p[0] - low[0], p[1] - low[1]]).collect()
     }
 
-    /// Height of the ridge between passes `width` apart on a surface of curvature `kappa`: where the outlines cross, each
-    /// turned by half of the width about the surface's middle.
+    /// Height of the ridge between passes `width` apart on a surface of curvature `kappa`: where the outlines
+    /// cross, each turned by half of the width about the surface's middle.
     fn ridge(hull: &[[f64; 2]], width: f64, kappa: f64) -> f64 {
         // By the way along the surface and the height over it.
         let polar = |[x, y]: [f64; 2]| {
@@ -425,8 +436,8 @@ mod tests {
         }
     }
 
-    /// The cone of a taper begins far above the scallops: on level and hollow ground its strips are those of the bull nose with the same
-    /// end, though its side leads out of a hollow again.
+    /// The cone of a taper begins far above the scallops: on level and hollow ground its strips are those of
+    /// the bull nose with the same end, though its side leads out of a hollow again.
     #[test]
     fn a_long_side_changes_no_strip() {
         let taper = Cutter::taper(3.0, 1.0, 5f64.to_radians(), 6.0).unwrap();

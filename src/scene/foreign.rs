@@ -20,8 +20,9 @@ use toolpath::{ForeignProgram, ReadProgram, ToolsMeant};
 /// Largest program that is read, bytes: some twenty million lines.
 const MAX_BYTES: u64 = 1 << 29;
 
-/// How far above the program's zero the tool starts, mm, and that of the machine is taken to be where no machine is known: above the
-/// highest place of a program that with the longest tool goes higher. G28 and G53 go there.
+/// How far above the program's zero the tool starts, mm, and that of the machine is taken to be where no
+/// machine is known: above the highest place of a program that with the longest tool goes higher. G28 and G53
+/// go there.
 pub const MACHINE_ZERO_ABOVE: f64 = 200.0;
 
 /// Largest table of tools that is read, bytes.
@@ -142,8 +143,8 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     Ok(())
 }
 
-/// Where the program's zero is on the machine. A control that knows no lengths counts from where the tool's tip is, else from the
-/// spindle nose.
+/// Where the program's zero is on the machine. A control that knows no lengths counts from where the tool's
+/// tip is, else from the spindle nose.
 fn setup(scene: &Scene, without_lengths: bool) -> Setup {
     let known = scene.five_axis.as_ref().filter(|machine| machine.zero_is_given && machine.gauge_is_given);
     let Some(machine) = known else { return Setup::from_above(MACHINE_ZERO_ABOVE) };
@@ -248,7 +249,8 @@ fn in_text(error: &ProgramError, bytes: &[u8]) -> SceneError {
     source.error(at..at + 1, message, error.cure())
 }
 
-/// The runs of all tools that cut; else what is wrong, and the cure. Tools without a cutter that only travel are left out.
+/// The runs of all tools that cut; else what is wrong, and the cure. Tools without a cutter that only travel
+/// are left out.
 fn known(
     read: &Program,
     runs: Vec<ToolRun>,

@@ -169,7 +169,8 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
     }))
 }
 
-/// The words with which tool centre point control begins and ends. Both are needed to leave it as it was begun.
+/// The words with which tool centre point control begins and ends. Both are needed to leave it as it was
+/// begun.
 fn tcp_words(table: &Section<'_>, post: Style) -> Result<[String; 2], SceneError> {
     let given = [table.text(TCP_KEYS[0])?, table.text(TCP_KEYS[1])?];
     let at = |k: usize| table.key_span(TCP_KEYS[k]);
@@ -197,8 +198,8 @@ fn tcp_words(table: &Section<'_>, post: Style) -> Result<[String; 2], SceneError
     }
 }
 
-/// Refuses a machine for which it is not known how high its spindle nose has to be to stand over the work: no program for it could
-/// begin or end safely.
+/// Refuses a machine for which it is not known how high its spindle nose has to be to stand over the work: no
+/// program for it could begin or end safely.
 pub(super) fn known_height(machine: &Section<'_>, five_axis: Option<&FiveAxis>) -> Result<(), SceneError> {
     let Some(FiveAxis { zero_is_given, gauge_is_given, .. }) = five_axis else { return Ok(()) };
     let keys =

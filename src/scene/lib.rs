@@ -95,7 +95,8 @@ pub struct ToolpathRequest {
     pub strategy: Box<dyn Strategy>,
     /// How far its passes lie apart.
     pub step: Step,
-    /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
+    /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the
+    /// strategy.
     pub directions: Vec<NamedFile>,
     /// Whether passes planned by a scallop height are corrected by what is measured of them.
     pub correct: bool,

@@ -49,8 +49,8 @@ impl Scene {
         Self::of_text(&path.to_string_lossy(), text)
     }
 
-    /// Checks a scene's text and reads what its toolpaths need from files. `name` is what messages call it, and relative
-    /// paths start from its folder.
+    /// Checks a scene's text and reads what its toolpaths need from files. `name` is what messages call it,
+    /// and relative paths start from its folder.
     ///
     /// # Errors
     /// [`SceneError`] when anything in it, or a file that it names, is wrong.

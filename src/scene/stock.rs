@@ -1,5 +1,5 @@
-//! `[stock]`: what there is before the first cut. A block around the part by default; or a block between two corners, a round
-//! bar, or a mesh.
+//! `[stock]`: what there is before the first cut. A block around the part by default; or a block between two
+//! corners, a round bar, or a mesh.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;

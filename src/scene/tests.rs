@@ -746,7 +746,8 @@ fn how_corners_are_blended_is_read_where_it_acts() {
     assert!(refused(five).contains("rotary axes"), "{}", refused(five));
 }
 
-/// Where a feed stands in [cutter], it is named there; else the rate of the machine that is below the usual one.
+/// Where a feed stands in [cutter], it is named there; else the rate of the machine that is below the usual
+/// one.
 #[test]
 fn feeds_beyond_the_rapid_rate_are_refused() {
     let of = |cutter: &str, machine: &str| {

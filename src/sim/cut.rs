@@ -3,26 +3,28 @@
 //! Enters: stock, cutter, path. Leaves: the stock after the whole path, as exact as that of
 //! [`cut_reference`](crate::cut_reference)(super::cut_reference) to 0.01 µm, in a small share of its time.
 //!
-//! Tiles of the grid, one worker each, hold the moves that can reach them and are divided like a
-//! quadtree, down to leaves of 8 × 8 cells. At every square moves are dropped that cannot be lowest
-//! anywhere in it, so that few are left in a leaf; those are evaluated in closed form at every cell.
+//! Tiles of the grid, one worker each, hold the moves that can reach them and are divided like a quadtree,
+//! down to leaves of 8 × 8 cells. At every square moves are dropped that cannot be lowest anywhere in it, so
+//! that few are left in a leaf; those are evaluated in closed form at every cell.
 //!
 //! # The bound
-//! Let c be a square's corners and b a move that passes all of it. The height `h_b` is convex
-//! ([`sweep`]), so inside the square it lies below the bilinear interpolation of its values at the
-//! corners, which is a convex combination of them. Another move lies above any plane that touches it
-//! from below, and a plane is its own bilinear interpolation. Hence, if the plane of move j lies
-//! at or above `h_b` at the four corners, j lies at or above b in all of the square, and can go. The same
-//! holds with the level of the stock in place of b. No curvature enters, and no case is left out:
-//! plunges, moves of no length and moves beside the stock have convex heights too.
+//! Let c be a square's corners and b a move that passes all of it. The height `h_b` is convex ([`sweep`]), so
+//! inside the square it lies below the bilinear interpolation of its values at the corners, which is a convex
+//! combination of them. Another move lies above any plane that touches it from below, and a plane is its own
+//! bilinear interpolation. Hence, if the plane of move j lies at or above `h_b` at the four corners, j lies
+//! at or above b in all of the square, and can go. The same holds with the level of the stock in place of b.
+//! No curvature enters, and no case is left out: plunges, moves of no length and moves beside the stock have
+//! convex heights too.
 //!
 //! # Choices
-//! The bound serves all cutters with one engine. Where the place on the track is at the end of a move in all of a square, the
-//! neighbour in the program cuts as low, and the move goes too: short chords cost little more than long ones.
+//! The bound serves all cutters with one engine. Where the place on the track is at the end of a move in all
+//! of a square, the neighbour in the program cuts as low, and the move goes too: short chords cost little
+//! more than long ones.
 //!
-//! Heights in a leaf are f32 in coordinates of the tile. Where their rounding matters (walls, rims, steep tracks, unsettled
-//! places on a torus) the leaf is worked out again in f64. Deep tiles and large cutters are cut in f64 throughout.
-//! Barrels, whose place on the track has no closed form, go through [`cut_reference`](crate::cut_reference)(super::cut_reference).
+//! Heights in a leaf are f32 in coordinates of the tile. Where their rounding matters (walls, rims, steep
+//! tracks, unsettled places on a torus) the leaf is worked out again in f64. Deep tiles and large cutters are
+//! cut in f64 throughout. Barrels, whose place on the track has no closed form, go through
+//! [`cut_reference`](crate::cut_reference)(super::cut_reference).
 
 mod choose;
 mod leaf;
@@ -73,16 +75,18 @@ const TILE_RADII: f64 = 2.2;
 /// the last place is 1e-6 mm, and a height is rounded a few times. Deeper tiles are cut in f64.
 const DEEPEST: f64 = 32.0;
 
-/// Cuts `stock` along every move of `path`, rapids included, in place: the height of a cell becomes the
-/// least of the stock and of all moves, and `cut_by` names a move that reaches down to it ([`NOT_CUT`]
-/// where the stored height stays that of the stock).
+/// Cuts `stock` along every move of `path`, rapids included, in place: the height of a cell becomes the least
+/// of the stock and of all moves, and `cut_by` names a move that reaches down to it ([`NOT_CUT`] where the
+/// stored height stays that of the stock).
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so; the stock is lost then.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so; the stock is lost then.
 ///
 /// # Tolerance
 /// Heights lie within 1e-5 mm, or half a unit in the last place of f32 if that is more, of those of
-/// [`cut_reference`](crate::cut_reference). The bits depend neither on the number of threads nor on the machine's vector unit.
+/// [`cut_reference`](crate::cut_reference). The bits depend neither on the number of threads nor on the
+/// machine's vector unit.
 pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, CutError> {
     cut_counted(stock, cutter, path, monitor).map(|(map, _)| map)
 }
@@ -233,8 +237,8 @@ impl UnorderedCut<'_> {
         }
     }
 
-    /// Plain code that goes from square to square. Vector code begins below it, where a call costs little beside the
-    /// work: at each leaf and at each choice ([`lanes::dispatch`]).
+    /// Plain code that goes from square to square. Vector code begins below it, where a call costs little
+    /// beside the work: at each leaf and at each choice ([`lanes::dispatch`]).
     fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: TileTask<'_, '_>) -> Work {
         let TileTask { cells: tile, moves, tracks, frame, tops } = tile;
         let mut levels = vec![Level::new()];
@@ -369,8 +373,8 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             return;
         }
         self.choose::<1>(0, [[0, 0]], side);
-        // A stack of squares, each with the level whose moves it chose from and its place among the squares that
-        // chose together.
+        // A stack of squares, each with the level whose moves it chose from and its place among the squares
+        // that chose together.
         let mut waiting = [(0usize, 0usize, [0usize; 2], 0usize); 64];
         waiting[0] = (0, 0, [0, 0], side);
         let mut count = 1;

@@ -103,8 +103,8 @@ impl Grid {
         Ok(Self { origin, cell, nx: nx as usize, ny: ny as usize })
     }
 
-    /// Along one axis, how much of what reaches from `low` to `high` the cell with this centre stands for: the cell, but the
-    /// outermost one that lies in it up to its end.
+    /// Along one axis, how much of what reaches from `low` to `high` the cell with this centre stands for:
+    /// the cell, but the outermost one that lies in it up to its end.
     pub fn breadth(&self, centre: f64, [low, high]: [f64; 2]) -> f64 {
         let from = if centre - self.cell < low { low } else { centre - 0.5 * self.cell };
         let to = if centre + self.cell > high { high } else { centre + 0.5 * self.cell };

@@ -1,21 +1,22 @@
-//! The engine that keeps the order of the program: what each move removes from the stock that the
-//! moves before it left.
+//! The engine that keeps the order of the program: what each move removes from the stock that the moves
+//! before it left.
 //!
 //! Enters: stock, cutter, path. Leaves: the stock after the path, and for every move its volume, its
 //! engagement, and where a rapid move touched stock; mm, z up.
 //!
 //! The grid is cut into tiles, one worker each, and a tile runs through its moves in the order of the
-//! program. Over the cells of a tile stands a tree with sixteen children a node (`tile`), each with a
-//! plane above all heights below it; a move descends only where a plane below its own cut reaches
-//! beneath that plane (`bound`). It cuts leaves of 8 × 8 cells (`leaf`), whose heights come from the
-//! vector loops of the engine without order, and from the closed forms of [`SweptMove`](super::SweptMove)
-//! where those leave a doubt (`heights`).
+//! program. Over the cells of a tile stands a tree with sixteen children a node (`tile`), each with a plane
+//! above all heights below it; a move descends only where a plane below its own cut reaches beneath that
+//! plane (`bound`). It cuts leaves of 8 × 8 cells (`leaf`), whose heights come from the vector loops of the
+//! engine without order, and from the closed forms of [`SweptMove`](super::SweptMove) where those leave a
+//! doubt (`heights`).
 //!
-//! A move leaves out the places that it cuts from its very start, since the move before cut them. A torus is tried first
-//! where the move ends: most cells of a short move are cut from there, and its slope bounds the height of the others.
+//! A move leaves out the places that it cuts from its very start, since the move before cut them. A torus is
+//! tried first where the move ends: most cells of a short move are cut from there, and its slope bounds the
+//! height of the others.
 //!
-//! Volumes are differences of stored heights, so that they add up to the stock removed. The bound of the total is half a cell
-//! times the variation of the heights before and after.
+//! Volumes are differences of stored heights, so that they add up to the stock removed. The bound of the
+//! total is half a cell times the variation of the heights before and after.
 
 mod bound;
 mod contact;
@@ -69,8 +70,8 @@ pub struct MoveRemoval {
     /// Greatest height above the tip (abeam of the place) at which the cutter met the stock that it
     /// removed, mm: the axial engagement. It does not depend on how a path is split into moves.
     pub axial: f64,
-    /// Extent of the engaged cells along the plan direction of the move, mm: it is in material no longer than that and its
-    /// radius. 0 of a plunge.
+    /// Extent of the engaged cells along the plan direction of the move, mm: it is in material no longer than
+    /// that and its radius. 0 of a plunge.
     pub along: f64,
     /// Extent of the engaged cells across the plan direction of the move, mm; of a plunge the greater
     /// of their extents along x and y.
@@ -115,21 +116,21 @@ impl Removal {
     }
 }
 
-/// Cuts `stock` in place along every move of `path`, rapids included, in the order of the program, and
-/// says what each move removed. The stock that is left can be handed to the next cutter.
+/// Cuts `stock` in place along every move of `path`, rapids included, in the order of the program, and says
+/// what each move removed. The stock that is left can be handed to the next cutter.
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so.
 ///
 /// # Tolerance
-/// Heights are those of [`cut_reference`](super::cut_reference) to one unit in the last place of f32
-/// (the order of moves changes no height), except that a cell whose centre lies on the rim of the cutter to
-/// the last bits may be cut or not. The bits depend neither on the number of threads nor on the machine's
-/// vector unit.
+/// Heights are those of [`cut_reference`](super::cut_reference) to one unit in the last place of f32 (the
+/// order of moves changes no height), except that a cell whose centre lies on the rim of the cutter to the
+/// last bits may be cut or not. The bits depend neither on the number of threads nor on the machine's vector
+/// unit.
 ///
 /// # Cost
-/// Beside the stock 64 bytes for each move in each tile of 128 × 128 cells that it cuts in, and 48 a
-/// move.
+/// Beside the stock 64 bytes for each move in each tile of 128 × 128 cells that it cuts in, and 48 a move.
 pub fn cut_in_order(
     stock: ZMap,
     cutter: &Cutter,

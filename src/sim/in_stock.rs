@@ -1,16 +1,16 @@
 //! Proof that moves stay out of what stands when they come, for upright tools.
 //!
-//! Enters: the stock, cutters, a path, and which of its moves are asked for. Leaves: the first of them that certainly meets
-//! stock, or else that is not shown to stay out; mm.
+//! Enters: the stock, cutters, a path, and which of its moves are asked for. Leaves: the first of them that
+//! certainly meets stock, or else that is not shown to stay out; mm.
 //!
-//! A square of the plan holds nothing that a move meets where the cutter passes over the stock's greatest height there, or
-//! where an earlier move leaves no more: what a move sweeps is a convex function of x and y, so no higher in a rectangle than
-//! at its highest corner. Rectangles that neither shows are halved, down to half of what counts as a touch. The stock's
-//! rectangle is divided itself, so that its sides are exact.
+//! A square of the plan holds nothing that a move meets where the cutter passes over the stock's greatest
+//! height there, or where an earlier move leaves no more: what a move sweeps is a convex function of x and y,
+//! so no higher in a rectangle than at its highest corner. Rectangles that neither shows are halved, down to
+//! half of what counts as a touch. The stock's rectangle is divided itself, so that its sides are exact.
 //!
-//! Places of the tip at which the same cutter has been before, as deep or deeper, cut nothing: they are left out first. So
-//! a move back along a slot or out of a hole is told exactly, where it touches walls all along; so is what lies behind a
-//! place that a move leaves.
+//! Places of the tip at which the same cutter has been before, as deep or deeper, cut nothing: they are left
+//! out first. So a move back along a slot or out of a hole is told exactly, where it touches walls all along;
+//! so is what lies behind a place that a move leaves.
 
 use std::rc::Rc;
 
@@ -30,8 +30,8 @@ use super::{ENGAGED, Grid, Stock};
 const MOST_RECTANGLES: usize = 20_000;
 const LEAST_RECTANGLES: usize = 200;
 
-/// Bins along the longer side of the stock at most, and their least side over the cutter's radius. Finer ones take memory
-/// for each move, coarser ones longer lists.
+/// Bins along the longer side of the stock at most, and their least side over the cutter's radius. Finer ones
+/// take memory for each move, coarser ones longer lists.
 const MOST_BINS: f64 = 64.0;
 const LEAST_BIN: f64 = 0.5;
 
@@ -173,7 +173,8 @@ impl Part {
 }
 
 impl Body {
-    /// No lower than this over a rectangle, where a hair `less` of the radius and of the depth does not count.
+    /// No lower than this over a rectangle, where a hair `less` of the radius and of the depth does not
+    /// count.
     fn lowest(&self, over: &Rectangle, less: f64) -> f64 {
         let of_part = |part: &Part| {
             let track = &part.track;
@@ -213,16 +214,17 @@ impl Body {
     }
 }
 
-/// The first of the moves that are asked for that certainly is in what stands when it comes, or else the first that is not
-/// shown to stay out; `None` where all do.
-/// What cut `before` the path has its cutters beside it.
+/// The first of the moves that are asked for that certainly is in what stands when it comes, or else the
+/// first that is not shown to stay out; `None` where all do. What cut `before` the path has its cutters
+/// beside it.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
-/// Less than [`ENGAGED`] of the radius and of the depth is a touch. The cutters may stray from the path by `strays`: stock is
-/// taken to stand by as much beyond what they sweep. Places of the tip are taken as they are.
+/// Less than [`ENGAGED`] of the radius and of the depth is a touch. The cutters may stray from the path by
+/// `strays`: stock is taken to stand by as much beyond what they sweep. Places of the tip are taken as they
+/// are.
 pub fn first_in_stock(
     stock: &Stock,
     before: &[(Cutter, Toolpath)],

@@ -9,11 +9,12 @@ use work::monitor::Monitor;
 /// How one cutter cuts heights along a path, as [`cut`](super::cut()) does.
 pub type CutHeights = fn(ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, CutError>;
 
-/// Cuts `stock` along every move of `path`, each by its own cutter. Moves are counted through the whole path; of equal cuts
-/// that of the first cutter counts.
+/// Cuts `stock` along every move of `path`, each by its own cutter. Moves are counted through the whole path;
+/// of equal cuts that of the first cutter counts.
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so.
 ///
 /// # Tolerance
 /// That of `cut`.
@@ -39,7 +40,8 @@ pub fn cut_in_turn(
 /// As [`cut_in_order`], each move by its own cutter.
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so.
 pub fn cut_in_order_in_turn(
     stock: ZMap,
     cutters: &Cutters,

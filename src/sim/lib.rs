@@ -1,10 +1,12 @@
 //! Stock, the swept cutter, and the engines that cut: on heights, along normals, and on voxels.
 //!
-//! Enters: stock, a cutter or a solid tool, and moves. Leaves: the stock after the moves, the move that cut each place, and
-//! what each move removes. Lengths in mm, volumes in mm³, z up. This crate sees neither strategies nor the design part.
+//! Enters: stock, a cutter or a solid tool, and moves. Leaves: the stock after the moves, the move that cut
+//! each place, and what each move removes. Lengths in mm, volumes in mm³, z up. This crate sees neither
+//! strategies nor the design part.
 //!
-//! Limits: engines on heights ([`cut`], [`cut_in_order`]) need an upright tool, and return an error for others. Tilted tools are cut by [`VoxelEngine`] and
-//! [`Rays`]. Results depend neither on the number of threads nor on the vector unit.
+//! Limits: engines on heights ([`cut`], [`cut_in_order`]) need an upright tool, and return an error for
+//! others. Tilted tools are cut by [`VoxelEngine`] and [`Rays`]. Results depend neither on the number of
+//! threads nor on the vector unit.
 
 mod bins;
 mod cut;

@@ -1,9 +1,8 @@
 //! How far the cut surface is from a place along its normal, for any tool axis: the engine of normal rays.
 //!
-//! Enters: a path, the tool as a solid, and places with unit normals, mm. Leaves: for each the lowest
-//! `s` in `[−inward, outward]` at which `P + s n` lies within the swept volume, the move that does it and
-//! when. That is the deviation of the cut surface at the place: below zero a gouge, above zero what was
-//! left.
+//! Enters: a path, the tool as a solid, and places with unit normals, mm. Leaves: for each the lowest `s` in
+//! `[−inward, outward]` at which `P + s n` lies within the swept volume, the move that does it and when. That
+//! is the deviation of the cut surface at the place: below zero a gouge, above zero what was left.
 //!
 //! All moves but rapids cut; a rapid within the part is a collision, which the other engines report.
 //!
@@ -12,8 +11,8 @@
 //! distance from a convex piece of the tool lies above its supporting plane. Nothing is sampled: where no
 //! bound says so, no move is left out.
 //!
-//! Moves that reach equally low go to the first of the program, and a later one must be lower. Level ground, where hundreds of
-//! flat ends are equal, is then as fast as waves.
+//! Moves that reach equally low go to the first of the program, and a later one must be lower. Level ground,
+//! where hundreds of flat ends are equal, is then as fast as waves.
 
 mod lowest;
 #[cfg(test)]
@@ -113,7 +112,8 @@ impl Rays {
     /// Of all moves of `path` but rapids.
     ///
     /// # Errors
-    /// [`RaysError::Path`]; [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
+    /// [`RaysError::Path`]; [`RaysError::Opposite`] when one turns the axis to its opposite;
+    /// [`RaysError::Cancelled`].
     pub fn new(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
         check(monitor)?;
         path.check()?;

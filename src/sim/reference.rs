@@ -39,18 +39,18 @@ const SLACK: f64 = 1.0e-9;
 /// The rank of the stock among the moves: before the first one.
 const STOCK: f64 = -1.0;
 
-/// Cuts `stock` along every move of `path`, rapids included: the height of a cell becomes the least
-/// of the stock and of all moves, and `cut_by` names the first of the moves that reach down to it
-/// ([`NOT_CUT`] where the stored height stays that of the stock, also if an earlier path had cut
-/// there).
+/// Cuts `stock` along every move of `path`, rapids included: the height of a cell becomes the least of the
+/// stock and of all moves, and `cut_by` names the first of the moves that reach down to it ([`NOT_CUT`] where
+/// the stored height stays that of the stock, also if an earlier path had cut there).
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so.
 ///
 /// # Tolerance
-/// Moves are evaluated and compared in f64 (see [`SweptMove`](super::SweptMove)) at the cell
-/// centres; storing the height as f32 adds at most half a unit in its last place: 0.004 µm below 128
-/// mm, 0.03 µm below 1 m. The bits do not depend on the number of threads.
+/// Moves are evaluated and compared in f64 (see [`SweptMove`](super::SweptMove)) at the cell centres; storing
+/// the height as f32 adds at most half a unit in its last place: 0.004 µm below 128 mm, 0.03 µm below 1 m.
+/// The bits do not depend on the number of threads.
 pub fn cut_reference(
     stock: &ZMap,
     cutter: &Cutter,

@@ -1,18 +1,17 @@
 //! The volume that a tool sweeps, as a solid, for any tool axis.
 //!
-//! Enters: the tool as a [`Solid`] and its moves, on each of which the tip runs straight while the axis
-//! turns evenly ([`ClPoint::towards`]). Leaves: the signed distance of a place from the swept volume, mm,
-//! with the time at which the tool comes nearest; for one move, and for all moves of a path through a
-//! search tree.
+//! Enters: the tool as a [`Solid`] and its moves, on each of which the tip runs straight while the axis turns
+//! evenly ([`ClPoint::towards`]). Leaves: the signed distance of a place from the swept volume, mm, with the
+//! time at which the tool comes nearest; for one move, and for all moves of a path through a search tree.
 //!
 //! Seen from a tool that stands still, a place runs along a smooth curve, and the distance from a convex
 //! solid is a convex function of the place. Its supporting plane at one time and a bound on how the curve
-//! bends therefore bound the distance from below at all other times, which both the tree and the search
-//! for the nearest time rest on.
+//! bends therefore bound the distance from below at all other times, which both the tree and the search for
+//! the nearest time rest on.
 //!
-//! A bound by speed alone would need many more looks. The tree holds the track of one point of the tool and a mean axis. Boxes
-//! around the whole leaning tool would be so large that every place lies in them. A move that turns the axis to its
-//! opposite is refused, since nothing says which way round.
+//! A bound by speed alone would need many more looks. The tree holds the track of one point of the tool and a
+//! mean axis. Boxes around the whole leaning tool would be so large that every place lies in them. A move
+//! that turns the axis to its opposite is refused, since nothing says which way round.
 
 mod moves;
 mod search;

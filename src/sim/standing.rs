@@ -1,12 +1,13 @@
 //! How near shank and holder of an upright tool come to the stock that stands when they pass.
 //!
-//! Enters: the stock, the cutter, the holder, a path. Leaves: the least distance with a bound, its move and place, and the
-//! moves on which they collide; mm.
+//! Enters: the stock, the cutter, the holder, a path. Leaves: the least distance with a bound, its move and
+//! place, and the moves on which they collide; mm.
 //!
-//! The program is replayed on square tiles ([`replay`]). A tile knows for each of its cells a height above which nothing
-//! stands in the whole cell, and for the corners of the cells what stands there. The first gives a bound, the second
-//! a distance that is reached. Where the two leave open what is asked, the tile is divided, and its quarters replay the
-//! moves near them on cells of half the size. So the cells are fine only beside the nearest places.
+//! The program is replayed on square tiles ([`replay`]). A tile knows for each of its cells a height above
+//! which nothing stands in the whole cell, and for the corners of the cells what stands there. The first
+//! gives a bound, the second a distance that is reached. Where the two leave open what is asked, the tile is
+//! divided, and its quarters replay the moves near them on cells of half the size. So the cells are fine only
+//! beside the nearest places.
 //!
 //! A section no wider than the cutter needs no look: it stands where the cutter has been.
 
@@ -32,7 +33,8 @@ pub const FAR: f64 = 10.0;
 const OPEN_SHARE: f64 = 0.05;
 const OPEN: f64 = 0.01;
 
-/// First cells over the cutter's radius. Finer ones take longer where all is clear, coarser ones are divided more often.
+/// First cells over the cutter's radius. Finer ones take longer where all is clear, coarser ones are divided
+/// more often.
 const FIRST_CELL: f64 = 0.25;
 
 /// Cells are not divided below this, mm. A holder that rubs along a wall would divide them without end.
@@ -62,8 +64,8 @@ pub struct NearStanding {
 pub struct StandingClearance {
     /// The nearest place; `None` where nothing comes nearer than [`FAR`].
     pub nearest: Option<NearStanding>,
-    /// No place comes nearer than the nearest, or than [`FAR`], by more than this, mm; infinite where the search left it open
-    /// whether they collide. Of a collision the depth is at least that found.
+    /// No place comes nearer than the nearest, or than [`FAR`], by more than this, mm; infinite where the
+    /// search left it open whether they collide. Of a collision the depth is at least that found.
     pub error_bound: f64,
     /// Moves on which they certainly collide, in program order; those beside a deeper one may be missing.
     pub collisions: Vec<u32>,
@@ -81,8 +83,8 @@ struct Section {
 }
 
 impl Section {
-    /// Distance of a column of stock, `rho` mm or more from the axis and up to `height` above the tip: exact above
-    /// zero, and else at most the distance of some place of the column.
+    /// Distance of a column of stock, `rho` mm or more from the axis and up to `height` above the tip: exact
+    /// above zero, and else at most the distance of some place of the column.
     fn distance_of_column(&self, rho: f64, height: f64) -> f64 {
         let [low, high] = self.solid.heights();
         let at = |z: f64| self.solid.outline_foot(rho, z).distance;
@@ -124,15 +126,15 @@ struct Pending {
     bound: f64,
 }
 
-/// How near shank and holder come to what stands of `stock` when they pass, on every move of `path`, rapids included. Other
-/// cutters may have cut the stock `before`. `None` where no section is wider than the cutter.
+/// How near shank and holder come to what stands of `stock` when they pass, on every move of `path`, rapids
+/// included. Other cutters may have cut the stock `before`. `None` where no section is wider than the cutter.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
-/// See [`StandingClearance::error_bound`]. It is a twentieth of the clearance and a hundredth of a millimetre at most, unless
-/// more than 10,000 tiles leave it open. The result does not depend on the number of threads.
+/// See [`StandingClearance::error_bound`]. It is a twentieth of the clearance and a hundredth of a millimetre
+/// at most, unless more than 10,000 tiles leave it open. The result does not depend on the number of threads.
 pub fn holder_clearance(
     stock: &Stock,
     before: &[(Cutter, Toolpath)],

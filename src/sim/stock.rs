@@ -1,6 +1,5 @@
-//! What there is before the first cut: boxes, round bars, closed meshes, blocks roughed to some distance from a part, and
-//! blocks in which a pocket was begun.
-//! Engines on heights see it from above.
+//! What there is before the first cut: boxes, round bars, closed meshes, blocks roughed to some distance from
+//! a part, and blocks in which a pocket was begun. Engines on heights see it from above.
 
 use std::sync::Arc;
 
@@ -95,8 +94,8 @@ impl Stock {
         closed.then(|| Self::Mesh(Arc::new(StockMesh { tree: Bvh::new(&mesh), mesh })))
     }
 
-    /// A block that was roughed to `over` mm from the outer side of a part's surface. Beside an open surface its borders'
-    /// planes go on.
+    /// A block that was roughed to `over` mm from the outer side of a part's surface. Beside an open surface
+    /// its borders' planes go on.
     pub fn roughed(block: Aabb, part: TriangleMesh, over: f64) -> Self {
         Self::Roughed { block, part: Arc::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
     }
@@ -215,8 +214,8 @@ impl Stock {
         }
     }
 
-    /// Above this height nothing stands over the square of `half` mm to each side of `(x, y)`; minus infinity where nothing
-    /// stands at all.
+    /// Above this height nothing stands over the square of `half` mm to each side of `(x, y)`; minus infinity
+    /// where nothing stands at all.
     ///
     /// # Tolerance
     /// Exact; of a roughed block too high by up to 0.01 mm and what the surface rises within the square.
@@ -268,7 +267,8 @@ impl Stock {
         f64::NEG_INFINITY
     }
 
-    /// A height at `(x, y)` at which stock stands, the highest or a little below; minus infinity where there is none.
+    /// A height at `(x, y)` at which stock stands, the highest or a little below; minus infinity where there
+    /// is none.
     ///
     /// # Tolerance
     /// Exact; of a roughed block too low by 0.01 mm at most where the stock is thicker than that.
@@ -303,8 +303,9 @@ impl Stock {
         if z.is_finite() { seen.try_normalize(0.0).unwrap_or_else(Vector3::z) } else { Vector3::z() }
     }
 
-    /// Signed distance, mm, below zero inside, and its unit gradient: exact; of a roughed block the greater of those of the
-    /// block and of the surface, of a milled one that of the block: no greater than the true one.
+    /// Signed distance, mm, below zero inside, and its unit gradient: exact; of a roughed block the greater
+    /// of those of the block and of the surface, of a milled one that of the block: no greater than the true
+    /// one.
     pub fn foot(&self, q: &Point3) -> (f64, Vector3) {
         match self {
             Self::Roughed { block, part, over } => {
@@ -400,7 +401,8 @@ fn highest_in(corners: &[Point3; 3], low: [f64; 2], high: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A pyramid over a square: what is seen from above, and the greatest height over squares, against many places in them.
+    /// A pyramid over a square: what is seen from above, and the greatest height over squares, against many
+    /// places in them.
     #[test]
     fn heights_of_a_mesh_are_those_of_its_triangles() {
         let at = Point3::new;
@@ -436,7 +438,8 @@ mod tests {
         assert!((normal - Vector3::new(-1.0, 0.0, 1.0).normalize()).norm() < 1e-9, "{normal:?}");
     }
 
-    /// A block with a square pocket that runs out of one side: heights, greatest heights over squares, volume.
+    /// A block with a square pocket that runs out of one side: heights, greatest heights over squares,
+    /// volume.
     #[test]
     fn a_milled_block_stands_beside_what_was_cleared() {
         let at = Point3::new;

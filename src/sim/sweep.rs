@@ -20,8 +20,8 @@ use super::form::Form;
 use super::track::Track;
 use work::lanes::Real;
 
-/// One straight move of the tip, seen from a point on the line of its track. In f32 that is the point next to the
-/// middle of a tile: all numbers that matter are then no larger than the cutter and the tile.
+/// One straight move of the tip, seen from a point on the line of its track. In f32 that is the point next to
+/// the middle of a tile: all numbers that matter are then no larger than the cutter and the tile.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LocalMove<T> {
     /// That point.
@@ -122,8 +122,8 @@ pub(super) trait Sweep<T: Real>: Copy + Sync {
     /// Whether [`Sweep::at_end`] takes so much less time than [`Sweep::height`] that it pays to ask it first.
     const TRIES_END: bool = false;
 
-    /// Height of the cutter that stands at the upper or the lower end of its track, infinite where it does not
-    /// reach, and a height that the sweep is nowhere below: infinite where the first is the height of the
+    /// Height of the cutter that stands at the upper or the lower end of its track, infinite where it does
+    /// not reach, and a height that the sweep is nowhere below: infinite where the first is the height of the
     /// sweep. By the convexity of F: from its value and its slope there along the track.
     #[inline(always)]
     fn at_end(&self, _: &LocalMove<T>, _upper: bool, _along: T, _across: T) -> (T, T) {
@@ -309,8 +309,8 @@ fn margin<T: Real>(m: &LocalMove<T>, along: T, chord2: T) -> T {
     chord2 - off * off
 }
 
-/// No more than the least [`margin`] within a distance of a point of given squared distance from the track, unless
-/// negative: `(d + within)² <= d² + (2 radius + within) within` where d is no more than the radius.
+/// No more than the least [`margin`] within a distance of a point of given squared distance from the track,
+/// unless negative: `(d + within)² <= d² + (2 radius + within) within` where d is no more than the radius.
 #[inline(always)]
 fn inner_margin<T: Real>(radius: T, distance2: T, within: T) -> T {
     radius * radius - distance2 - (radius + radius + within) * within
@@ -398,9 +398,8 @@ impl<T: Real> Sweep<T> for Flat<T> {
     }
 }
 
-/// Any other profile: a cone at the bottom, an arc, a cone at the side, any of which may be
-/// missing. On the arc of a barrel (its centre beyond the axis) the place is not always found: such heights are
-/// in doubt.
+/// Any other profile: a cone at the bottom, an arc, a cone at the side, any of which may be missing. On the
+/// arc of a barrel (its centre beyond the axis) the place is not always found: such heights are in doubt.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rounded<T, const CONES: bool> {
     /// Slope of the bottom and where it ends.
@@ -456,8 +455,8 @@ const STEEPEST_PLANE: f64 = 4.0;
 /// Steps of Halley's method for the place that a plane touches: fewer only make it lower.
 const PLANE_STEPS: usize = 1;
 
-/// The same for heights, where the place counts: on tracks that rise by 0.01 or more, three leave 1e-15 mm and
-/// two 1e-6.
+/// The same for heights, where the place counts: on tracks that rise by 0.01 or more, three leave 1e-15 mm
+/// and two 1e-6.
 const HEIGHT_STEPS: usize = 3;
 
 /// Slope that stands for a vertical side, where no height is looked for.
@@ -520,7 +519,8 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
         }
     }
 
-    /// Height above the tip at a distance from the axis, up to the radius, and the slope there as rise and run.
+    /// Height above the tip at a distance from the axis, up to the radius, and the slope there as rise and
+    /// run.
     #[inline(always)]
     fn height_and_rise(&self, rho: T) -> (T, [T; 2]) {
         let (zero, one) = (T::of(0.0), T::of(1.0));

@@ -2,8 +2,9 @@
 //!
 //! Enters: stock (a box, a round bar, a closed mesh), the tool as a [`Solid`] and a path. Leaves: the signed
 //! distance from the surface of the remaining material at the samples near it, each with the move that is
-//! nearest there; from those its heights, its surface as a closed triangle mesh and where a line leaves it; its volume
-//! between proven bounds; how much each move removes in the order of the program, and how near a holder comes to what still stands.
+//! nearest there; from those its heights, its surface as a closed triangle mesh and where a line leaves it;
+//! its volume between proven bounds; how much each move removes in the order of the program, and how near a
+//! holder comes to what still stands.
 //!
 //! The material is the stock less all that the tool sweeps, so its distance is the greater of that of the
 //! stock and the negative of that of the swept volume: exact in sign and at the surface, elsewhere no greater

@@ -56,8 +56,8 @@ impl ZMap {
         Self { within: Some([bounds.min.xy(), bounds.max.xy()]), ..self }
     }
 
-    /// What stands over the cells' centres, seen from above; `bottom` where nothing stands. A roughed block counts as a
-    /// whole one.
+    /// What stands over the cells' centres, seen from above; `bottom` where nothing stands. A roughed block
+    /// counts as a whole one.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.

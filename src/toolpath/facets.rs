@@ -2,11 +2,11 @@
 
 use geometry::TriangleMesh;
 
-/// On a mesh passes are planned for less by what facets stand off the smooth surface: on elements, whose curvature is that of
-/// the facets around, and on meshes with steps, by the height that this share of them (by area) stays below. On surfaces
-/// fitted to smooth meshes by the height that nearly all stay below, less a share of the target, and by no more than another
-/// share: ridges cross facets at any height, and not all passes leave all of the target. Facets at sharper angles than the
-/// last, rad, are edges of the part.
+/// On a mesh passes are planned for less by what facets stand off the smooth surface: on elements, whose
+/// curvature is that of the facets around, and on meshes with steps, by the height that this share of them
+/// (by area) stays below. On surfaces fitted to smooth meshes by the height that nearly all stay below, less
+/// a share of the target, and by no more than another share: ridges cross facets at any height, and not all
+/// passes leave all of the target. Facets at sharper angles than the last, rad, are edges of the part.
 const FACETS_ON_ELEMENTS: f64 = 0.6;
 const FACETS: f64 = 0.95;
 const FACETS_LESS: f64 = 0.055;
@@ -22,8 +22,9 @@ pub(crate) fn facet_charge(mesh: &TriangleMesh, fitted: bool, target: f64) -> f6
     }
 }
 
-/// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ, each is as wide
-/// as its neighbours and has a sagitta of an eighth of δ times the width; the one that a share of them stays below.
+/// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ,
+/// each is as wide as its neighbours and has a sagitta of an eighth of δ times the width; the one that a
+/// share of them stays below.
 fn facet_height(mesh: &TriangleMesh, share: f64) -> f64 {
     let mut facets: Vec<(f64, f64)> = Vec::new();
     for t in 0..mesh.triangles().len() {

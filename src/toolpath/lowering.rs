@@ -1,10 +1,12 @@
 //! Moves that go a little deeper beside places where an earlier plan left a little too much.
 //!
-//! What is cut deeper can only sink: no pass has to be placed anew, and no ridge rises elsewhere, as it may when chords or levels
-//! change. Chords leave a share of their tolerance unused ([`unused_tolerance`](crate::unused_tolerance)); no point goes deeper by more.
+//! What is cut deeper can only sink: no pass has to be placed anew, and no ridge rises elsewhere, as it may
+//! when chords or levels change. Chords leave a share of their tolerance unused
+//! ([`unused_tolerance`](crate::unused_tolerance)); no point goes deeper by more.
 //!
-//! Enters: passes as tips of an upright cutter, and places, each with the way that the moves that cut it are to go. Leaves: the passes
-//! with the same points, some of them lower. A ridge sinks by as much as the moves on both its sides.
+//! Enters: passes as tips of an upright cutter, and places, each with the way that the moves that cut it are
+//! to go. Leaves: the passes with the same points, some of them lower. A ridge sinks by as much as the moves
+//! on both its sides.
 
 use std::collections::HashMap;
 
@@ -13,8 +15,8 @@ use geometry::{Point2, Point3, Vector3};
 use motion::{ROUNDING, in_last_decimals};
 use work::parallel;
 
-/// A move cuts a place too where it leaves there no more than so many times the way that it is to go above the place: on the other side
-/// of a ridge.
+/// A move cuts a place too where it leaves there no more than so many times the way that it is to go above
+/// the place: on the other side of a ridge.
 const BESIDE: f64 = 2.0;
 
 /// The steepest ground whose normal tells how much lower a way leads.
@@ -32,7 +34,8 @@ pub struct Lowered {
     pub by: Vector3,
 }
 
-/// The passes of a cutter after rounds of places, one after the other. No point goes farther than `most` mm in all.
+/// The passes of a cutter after rounds of places, one after the other. No point goes farther than `most` mm
+/// in all.
 pub(crate) fn lowered(
     passes: &[Vec<Point3>],
     cutter: &Cutter,
@@ -55,7 +58,8 @@ pub(crate) fn lowered(
     })
 }
 
-/// A point as a program writes it, moved by a way and a little on, to the nearest place that a program can write.
+/// A point as a program writes it, moved by a way and a little on, to the nearest place that a program can
+/// write.
 fn moved(point: Point3, way: &Vector3) -> Point3 {
     const LAST: f64 = 2.0 * ROUNDING;
     let square = way.norm_squared();
@@ -94,7 +98,8 @@ impl<'a> Places<'a> {
         found
     }
 
-    /// A move is looked at in steps of a cell: half of one lies between a place within a radius and the next step.
+    /// A move is looked at in steps of a cell: half of one lies between a place within a radius and the next
+    /// step.
     fn cell(&self, p: &Point3) -> [i64; 2] {
         [p.x, p.y].map(|x| (x * CELLS_A_RADIUS / self.cutter.radius()).floor() as i64)
     }
@@ -126,16 +131,18 @@ impl<'a> Places<'a> {
     }
 }
 
-/// The height that a cutter leaves over a place on a straight move, mm; infinite where it does not come over it, or where that is surely
-/// more than `most`.
+/// The height that a cutter leaves over a place on a straight move, mm; infinite where it does not come over
+/// it, or where that is surely more than `most`.
 fn left_over(cutter: &Cutter, [a, b]: [&Point3; 2], place: &Point2, most: f64) -> f64 {
     let (low, high) = if a.z <= b.z { (a, b) } else { (b, a) };
     let (way, to) = ((high - low).xy(), place - low.xy());
     let length = way.norm();
-    // How far along the climb the axis stands where the cutter is lowest over the place: of a convex function the nearest end is the least.
+    // How far along the climb the axis stands where the cutter is lowest over the place: of a convex function
+    // the nearest end is the least.
     let (at, along, across) = if length > 0.0 {
         let (along, across) = (to.dot(&way) / length, to.perp(&way).abs() / length);
-        // It is no lower beside the axis than abeam of it, and a convex function lies above its tangent in the middle of the move.
+        // It is no lower beside the axis than abeam of it, and a convex function lies above its tangent in
+        // the middle of the move.
         let abeam = cutter.height(across).map(|height| low.z + height);
         if abeam.is_none_or(|abeam| abeam.max(least_by_tangent(cutter, [low, high], place)) > most) {
             return f64::INFINITY;
@@ -149,7 +156,8 @@ fn left_over(cutter: &Cutter, [a, b]: [&Point3; 2], place: &Point2, most: f64) -
     cutter.height((along - at).hypot(across)).map_or(f64::INFINITY, |height| low.z + climbed + height)
 }
 
-/// A height, mm, that what a cutter leaves over a place is no less than anywhere on a move with a length in the plan view.
+/// A height, mm, that what a cutter leaves over a place is no less than anywhere on a move with a length in
+/// the plan view.
 fn least_by_tangent(cutter: &Cutter, [low, high]: [&Point3; 2], place: &Point2) -> f64 {
     let way = high - low;
     let middle = low + 0.5 * way;

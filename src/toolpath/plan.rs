@@ -36,7 +36,8 @@ pub struct Plan {
     pub field: Option<Arc<PlannedField>>,
     /// What another plan of the same toolpath may go on from.
     pub kept: Arc<Kept>,
-    /// How much nearer than asked a tool that leans comes to anything between its passes, mm; 0 where it keeps clear.
+    /// How much nearer than asked a tool that leans comes to anything between its passes, mm; 0 where it
+    /// keeps clear.
     pub too_near_between: f64,
 }
 
@@ -74,8 +75,9 @@ impl Kept {
     }
 }
 
-/// A scallop target is planned for less this share of the chord tolerance, unless moves go deeper where that is needed. A chord may raise a
-/// ridge by half of it, but ridges stand between chords of two passes, whose greatest deviations seldom meet.
+/// A scallop target is planned for less this share of the chord tolerance, unless moves go deeper where that
+/// is needed. A chord may raise a ridge by half of it, but ridges stand between chords of two passes, whose
+/// greatest deviations seldom meet.
 const CHORD_SHARE: f64 = 0.26;
 
 /// The same of smoothed passes, whose points and chords stray farther.
@@ -150,9 +152,10 @@ fn deeper(passes: Vec<Vec<Point3>>, cutter: &Cutter, settings: &PlanSettings) ->
 
 /// Plans one path of a cutter that tilts.
 ///
-/// On patches the cutter is located by its contact, on level curves of the strategy's function. A ball cutter's centre
-/// stands where it does upright, so that on meshes, and with strategies that drop the cutter, the upright path is tilted
-/// around it. Other cutters are located there by the contacts of a ball that is dropped in their stead.
+/// On patches the cutter is located by its contact, on level curves of the strategy's function. A ball
+/// cutter's centre stands where it does upright, so that on meshes, and with strategies that drop the cutter,
+/// the upright path is tilted around it. Other cutters are located there by the contacts of a ball that is
+/// dropped in their stead.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -235,8 +238,8 @@ fn with_task<T>(
     make(&task)
 }
 
-/// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they take seconds to
-/// search for, and slow all plans of a part alike.
+/// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they
+/// take seconds to search for, and slow all plans of a part alike.
 fn duration(
     passes: &Passes,
     chord_tolerance: f64,

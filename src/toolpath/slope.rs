@@ -1,7 +1,9 @@
-//! Passes over the faces of some slopes alone: of a part with level ground and walls, each strategy takes what suits it.
+//! Passes over the faces of some slopes alone: of a part with level ground and walls, each strategy takes
+//! what suits it.
 //!
-//! Enters: the passes of an upright cutter over all that its strategy covers. Leaves: their stretches on which the cutter touches faces
-//! of these slopes, or would from an interval beside: there the passes end, and others of other slopes begin.
+//! Enters: the passes of an upright cutter over all that its strategy covers. Leaves: their stretches on
+//! which the cutter touches faces of these slopes, or would from an interval beside: there the passes end,
+//! and others of other slopes begin.
 
 use std::f64::consts::TAU;
 use std::mem;
@@ -123,7 +125,8 @@ impl Served<'_> {
         touches(axis) || around(self.chord_tolerance) || around(self.interval)
     }
 
-    /// The vertical part of the unit normal by which the cutter touches: on an edge its own, between those of both faces.
+    /// The vertical part of the unit normal by which the cutter touches: on an edge its own, between those of
+    /// both faces.
     fn upright(&self, axis: Point2, rests: &Drop) -> f64 {
         let (contact, mesh) = (&rests.contact, self.part.mesh());
         let around = mesh.triangles_at(contact.triangle as usize, &contact.point);
@@ -189,8 +192,9 @@ mod tests {
         moves.flat_map(|(from, to, _)| [from, to]).collect()
     }
 
-    /// Passes for the top lie as far apart as on a plane, though the walls are steep; each ends an interval beyond the place where a ball,
-    /// or a bull nose, has rolled over the edge by the steepest slope that is asked for. The plan is told of no steep places.
+    /// Passes for the top lie as far apart as on a plane, though the walls are steep; each ends an interval
+    /// beyond the place where a ball, or a bull nose, has rolled over the edge by the steepest slope that is
+    /// asked for. The plan is told of no steep places.
     #[test]
     fn passes_for_the_top_end_where_the_tool_has_rolled_over_its_edge() {
         for (cutter, corner) in [(Cutter::ball(4.0).unwrap(), 2.0), (Cutter::bull(4.0, 0.5).unwrap(), 0.5)] {
@@ -216,8 +220,9 @@ mod tests {
         }
     }
 
-    /// Contours follow the walls alone whatever is asked for: asked for those they stay as they are, beside the foot as well, where
-    /// a pass that is off by its tolerance touches nothing. Asked for the top nothing is left of them.
+    /// Contours follow the walls alone whatever is asked for: asked for those they stay as they are, beside
+    /// the foot as well, where a pass that is off by its tolerance touches nothing. Asked for the top nothing
+    /// is left of them.
     #[test]
     fn contours_of_walls_stay_whole() {
         for cutter in [Cutter::ball(4.0), Cutter::bull(4.0, 0.5), Cutter::flat(4.0)].map(Result::unwrap) {

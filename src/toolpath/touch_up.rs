@@ -1,9 +1,9 @@
 //! Short passes over places where an earlier plan left too much, while all other passes stay where they are.
 //!
-//! Enters: the passes of an upright cutter, or the contacts of one that leans, and places on the design. Leaves: further passes
-//! of what is dropped in its stead, each beside a stretch of its nearest pass and through the places there, so that it runs
-//! along their ridge. What is cut once more can only sink;
-//! passes that are placed anew leave ridges at other places.
+//! Enters: the passes of an upright cutter, or the contacts of one that leans, and places on the design.
+//! Leaves: further passes of what is dropped in its stead, each beside a stretch of its nearest pass and
+//! through the places there, so that it runs along their ridge. What is cut once more can only sink; passes
+//! that are placed anew leave ridges at other places.
 
 use crate::link::plane_interval;
 use crate::vocabulary::{PlanError, Task};
@@ -11,7 +11,8 @@ use drop_cutter::{Beside, DropCutter};
 use geometry::{CubicSpline, Point2, Point3, Vector2, share_on};
 use work::monitor;
 
-/// A pass serves what lies within this share of an interval beside it: on a plane, what stands there sinks to a quarter.
+/// A pass serves what lies within this share of an interval beside it: on a plane, what stands there sinks to
+/// a quarter.
 const SERVED: f64 = 0.25;
 
 /// It goes on to the next place along the ridge that is no farther than so many intervals,
@@ -30,8 +31,8 @@ pub(crate) fn note(added: &[Vec<Point3>]) -> Option<String> {
     (count > 0).then(|| format!("{count} {passes} once more over places where others left too much"))
 }
 
-/// Passes over the places that an earlier plan left too high, beside those that are `planned`; the first places are served
-/// first. Places that a cutter from above does not touch are left out.
+/// Passes over the places that an earlier plan left too high, beside those that are `planned`; the first
+/// places are served first. Places that a cutter from above does not touch are left out.
 ///
 /// # Errors
 /// When cancelled.
@@ -69,8 +70,8 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
     Ok(added)
 }
 
-/// The passes of their own that places take whose cutter stands at the `axes`: the length of each, mm. They are found one by one, so
-/// that who has seen enough may stop.
+/// The passes of their own that places take whose cutter stands at the `axes`: the length of each, mm. They
+/// are found one by one, so that who has seen enough may stop.
 pub fn short_passes(
     planned: &[Vec<Point3>],
     mut axes: Vec<Point2>,
@@ -80,8 +81,8 @@ pub fn short_passes(
     runs.map(|(_, [from, to])| to - from)
 }
 
-/// The pass beside which the first of the waiting places is served, and the run of it that serves those along it, mm; these wait
-/// no longer. `None` without places or passes.
+/// The pass beside which the first of the waiting places is served, and the run of it that serves those along
+/// it, mm; these wait no longer. `None` without places or passes.
 fn next_run(planned: &[Vec<Point3>], waiting: &mut Vec<Point2>, interval: f64) -> Option<(Copied, [f64; 2])> {
     let copy = Copied::beside(planned, *waiting.first()?, FARTHEST * interval)?;
     let run = copy.serve(waiting, interval);
@@ -96,7 +97,8 @@ struct Copied {
 }
 
 impl Copied {
-    /// Of the pass that is nearest to a place, up to `farthest` mm to either side of it; `None` without passes.
+    /// Of the pass that is nearest to a place, up to `farthest` mm to either side of it; `None` without
+    /// passes.
     fn beside(passes: &[Vec<Point3>], place: Point2, farthest: f64) -> Option<Self> {
         let stretches = passes.iter().flat_map(|pass| (1..pass.len()).map(move |k| (pass, k)));
         let near = stretches.map(|(pass, k)| {
@@ -144,7 +146,8 @@ impl Copied {
         pieces.min_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.0, f64::INFINITY])
     }
 
-    /// Takes the first of the waiting places, and those that follow it along the stretch; leaves the run that serves them.
+    /// Takes the first of the waiting places, and those that follow it along the stretch; leaves the run that
+    /// serves them.
     fn serve(&self, waiting: &mut Vec<Point2>, interval: f64) -> [f64; 2] {
         let found: Vec<[f64; 2]> = waiting.iter().map(|place| self.along_and_aside(*place)).collect();
         let mut beside: Vec<f64> = found.iter().filter(|f| f[1] <= SERVED * interval).map(|f| f[0]).collect();
@@ -221,8 +224,8 @@ mod tests {
         assert!(Copied::beside(&[], Point2::origin(), 1.0).is_none());
     }
 
-    /// Whether passes are tilted around a ball that was dropped (zigzag) or located by their contacts (the front): the ball's
-    /// centre is led over the place.
+    /// Whether passes are tilted around a ball that was dropped (zigzag) or located by their contacts (the
+    /// front): the ball's centre is led over the place.
     #[test]
     fn a_tool_that_leans_gets_passes_of_its_own_as_well() {
         let shape = AnalyticShape::Plane { height: 0.0 };

@@ -1,8 +1,9 @@
 //! Work that cannot be asked to stop, done aside so that whoever waits for it can.
 //!
-//! Enters: a closure that owns what it needs. Leaves: its result, or [`Cancelled`] some 20 ms after the monitor's wish.
-//! Triangulations, offsets of outlines, search trees and sparse factors come from crates that ask nobody. A cancelled
-//! closure runs on until it ends, and its result is dropped: a program that goes on has less of the machine meanwhile.
+//! Enters: a closure that owns what it needs. Leaves: its result, or [`Cancelled`] some 20 ms after the
+//! monitor's wish. Triangulations, offsets of outlines, search trees and sparse factors come from crates that
+//! ask nobody. A cancelled closure runs on until it ends, and its result is dropped: a program that goes on
+//! has less of the machine meanwhile.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,11 +11,12 @@ use std::time::Duration;
 
 use super::monitor::{Cancelled, Monitor};
 
-/// How long the monitor is not asked at most. Longer answers later, shorter wakes the waiting thread more often.
+/// How long the monitor is not asked at most. Longer answers later, shorter wakes the waiting thread more
+/// often.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What `work` gives, on a pool of its own with as many threads as the caller's, so that its loops give the same bits.
-/// Where no thread can be started it runs on the calling one.
+/// What `work` gives, on a pool of its own with as many threads as the caller's, so that its loops give the
+/// same bits. Where no thread can be started it runs on the calling one.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so before the work is done.

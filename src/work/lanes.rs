@@ -1,12 +1,12 @@
 //! Vector width picked at run time: one build serves every x86-64 and arm64 machine.
 //!
-//! Plain loops over arrays of fixed length become vector code for the widest unit found (AVX-512,
-//! AVX2, NEON) if they are compiled for it; [`dispatch`] compiles its closure once for each. Nothing in
-//! such code fuses a product with a sum, so that every width gives the same bits.
+//! Plain loops over arrays of fixed length become vector code for the widest unit found (AVX-512, AVX2, NEON)
+//! if they are compiled for it; [`dispatch`] compiles its closure once for each. Nothing in such code fuses a
+//! product with a sum, so that every width gives the same bits.
 //!
-//! Three traps. A closure that is not itself `#[inline(always)]` stays code for the oldest machine, so hot loops call
-//! functions. An inner loop keeps the outer one from becoming vector code. A masked store that the next line reads costs a
-//! stall.
+//! Three traps. A closure that is not itself `#[inline(always)]` stays code for the oldest machine, so hot
+//! loops call functions. An inner loop keeps the outer one from becoming vector code. A masked store that the
+//! next line reads costs a stall.
 
 /// Runs `work`, compiled for the vector unit of this machine. Everything hot that it calls must be
 /// `#[inline(always)]`: what is not inlined stays code for the oldest machine.

@@ -1,11 +1,13 @@
 //! The one place where work is spread over threads.
 //!
-//! Enters: a number of items, or a slice of them, and a closure for one item. Leaves: what the closure gave, in index
-//! order. Each item goes to exactly one call of the closure, so results never depend on the number of threads. That
-//! number is the one of the rayon pool in which the call runs (`rayon::ThreadPool::install`).
+//! Enters: a number of items, or a slice of them, and a closure for one item. Leaves: what the closure gave,
+//! in index order. Each item goes to exactly one call of the closure, so results never depend on the number
+//! of threads. That number is the one of the rayon pool in which the call runs
+//! (`rayon::ThreadPool::install`).
 //!
-//! Items are dealt out in blocks, which idle threads steal one by one. Only `on_all_threads` and `both` touch rayon,
-//! and neither is generic: rayon's trees of jobs are compiled once, not for each closure of the program.
+//! Items are dealt out in blocks, which idle threads steal one by one. Only `on_all_threads` and `both` touch
+//! rayon, and neither is generic: rayon's trees of jobs are compiled once, not for each closure of the
+//! program.
 
 use rayon::prelude::*;
 use std::ops::Range;
@@ -16,8 +18,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// it saves.
 const SERIAL_BELOW: usize = 2;
 
-/// Most blocks for each thread. With fewer of them threads wait at the end for a block of costly items; more of them
-/// cost more locks and lists than they save.
+/// Most blocks for each thread. With fewer of them threads wait at the end for a block of costly items; more
+/// of them cost more locks and lists than they save.
 const BLOCKS_A_THREAD: usize = 64;
 
 /// `f(0), f(1), … f(n - 1)`, in that order, computed on all threads.
@@ -84,7 +86,8 @@ pub fn for_each_chunk<T: Send>(items: &mut [T], chunk_len: usize, f: impl Fn(usi
     });
 }
 
-/// `f(k, item)` of every item, in order, stopping at the first error found, which is chosen as by [`try_map`].
+/// `f(k, item)` of every item, in order, stopping at the first error found, which is chosen as by
+/// [`try_map`].
 ///
 /// # Errors
 /// The error of the closure.
@@ -115,7 +118,8 @@ pub fn try_for_each<T: Send, E: Send>(
     try_map_mut(items, f).map(|_| ())
 }
 
-/// Calls `work(0), … work(count - 1)`, in no certain order, on the threads of the pool; each call can be stolen.
+/// Calls `work(0), … work(count - 1)`, in no certain order, on the threads of the pool; each call can be
+/// stolen.
 fn on_all_threads(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().with_max_len(1).for_each(work);
 }

@@ -42,7 +42,8 @@ fn all_good(name: &str) -> Vec<Value> {
     paths
 }
 
-/// Streamlines hold every tolerance; more of their ridges than asked of offset surfaces stand a little over the target.
+/// Streamlines hold every tolerance; more of their ridges than asked of offset surfaces stand a little over
+/// the target.
 #[test]
 #[ignore = "minutes: a blade cut twice"]
 fn a_twisted_blade_is_cut_on_both_sides() {
@@ -81,7 +82,8 @@ fn a_duct_is_cut_upright_and_leaning() {
     all_good("duct.toml");
 }
 
-/// Every strategy holds the target, leaves nothing uncut and gouges nothing. Sections offset in their planes lie too near where the blade leans: what would gouge is left out, which the report tells.
+/// Every strategy holds the target, leaves nothing uncut and gouges nothing. Sections offset in their planes
+/// lie too near where the blade leans: what would gouge is left out, which the report tells.
 #[test]
 #[ignore = "minutes: six toolpaths on a blade"]
 fn strategies_compare_on_one_side_of_a_blade() {
@@ -94,7 +96,8 @@ fn strategies_compare_on_one_side_of_a_blade() {
     assert!(in_planes["notes"].to_string().contains("cannot be reached"), "{}", in_planes["notes"]);
 }
 
-/// The toolpath of a blade of `scenes/blades` with axes that lead by ten degrees and turn by no more than 0.2 degrees a mm.
+/// The toolpath of a blade of `scenes/blades` with axes that lead by ten degrees and turn by no more than 0.2
+/// degrees a mm.
 fn turning_slowly(side: &str) -> Value {
     let home = tempfile::tempdir().unwrap();
     let scene = format!(

@@ -115,7 +115,8 @@ fn a_huge_cutter_reaches_a_small_plane() {
     }
 }
 
-/// A roof of two planes that meet in a ridge: its facets need the stepover of a plane, whatever a smooth surface over the ridge bends.
+/// A roof of two planes that meet in a ridge: its facets need the stepover of a plane, whatever a smooth
+/// surface over the ridge bends.
 #[test]
 fn a_crease_does_not_narrow_all_passes_of_a_zigzag() {
     let at = |x: f64, y: f64, z: f64| Point3::new(x, y, z);

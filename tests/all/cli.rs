@@ -423,8 +423,8 @@ fn answers_to_ctrl_c(child: std::process::Child, home: &Path) {
     assert_eq!(entries(home), ["plate.toml"]);
 }
 
-/// Ctrl-C at moments all over a run that would take a minute: status 2, and no file. A run that went on would end with
-/// another status.
+/// Ctrl-C at moments all over a run that would take a minute: status 2, and no file. A run that went on would
+/// end with another status.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
@@ -479,7 +479,8 @@ fn check_and_run_can_be_interrupted_while_the_part_is_read() {
     }
 }
 
-/// The signals that a process handles, a bit each, or ignores: a shell lets what it starts in the background ignore Ctrl-C.
+/// The signals that a process handles, a bit each, or ignores: a shell lets what it starts in the background
+/// ignore Ctrl-C.
 #[cfg(target_os = "linux")]
 fn caught_signals(process: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();

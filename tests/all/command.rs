@@ -48,8 +48,8 @@ pub fn millstream(home: &Path, arguments: &[&str]) -> Answer {
     command(home, arguments).output().expect("the program starts").into()
 }
 
-/// Ctrl-C as `kill` spells it. A shell ignores it for what it starts in the background, tests too, and the program
-/// keeps that; then it is SIGTERM, which means the same.
+/// Ctrl-C as `kill` spells it. A shell ignores it for what it starts in the background, tests too, and the
+/// program keeps that; then it is SIGTERM, which means the same.
 #[cfg(unix)]
 pub fn ctrl_c() -> &'static str {
     let told = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

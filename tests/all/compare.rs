@@ -1,5 +1,5 @@
-//! The comparison on eight surfaces (`scenes/compare`): the shortest streamlines against the best zigzag and iso-scallop
-//! passes, by what the simulated cut measures.
+//! The comparison on eight surfaces (`scenes/compare`): the shortest streamlines against the best zigzag and
+//! iso-scallop passes, by what the simulated cut measures.
 
 use std::path::{Path, PathBuf};
 
@@ -48,8 +48,8 @@ fn twisted() -> Value {
     })
 }
 
-/// The upper side of a section, 40 mm long at the root and 30 at the tip, that turns by 25 degrees over a span of
-/// 60 mm, from just behind the leading edge.
+/// The upper side of a section, 40 mm long at the root and 30 at the tip, that turns by 25 degrees over a
+/// span of 60 mm, from just behind the leading edge.
 fn blade_side() -> Value {
     patch([14, 9], |u, v| {
         let chord = 40.0 - 10.0 * v;
@@ -103,9 +103,10 @@ fn parts_are_those_of_their_generators() {
     }
 }
 
-/// Whether nothing is left uncut or gouged, at most 1 % of the ridges are over the target and none is above 1.1 times it,
-/// no zigzag or iso-scallop path takes less time, all joined alike, and the passes are levels of a stream function, or of a front that
-/// is named so and takes no more time than iso-scallop. With a line of the table.
+/// Whether nothing is left uncut or gouged, at most 1 % of the ridges are over the target and none is above
+/// 1.1 times it, no zigzag or iso-scallop path takes less time, all joined alike, and the passes are levels
+/// of a stream function, or of a front that is named so and takes no more time than iso-scallop. With a line
+/// of the table.
 fn quickest_of_all(name: &str, scene: &Path) -> (String, [bool; 6]) {
     let (_, report) = run_scene(scene);
     let of = |k: usize, what: &str| number(&report, &format!("/toolpaths/{k}/{what}"));
@@ -156,8 +157,8 @@ fn scene(name: &str) -> String {
     text.replace("file = \"", &format!("file = \"{}/", folder().display()))
 }
 
-/// The middle of the saddle, `half` mm to each side, in coarser cells and as first planned: a correction costs streamlines what their
-/// border asks for.
+/// The middle of the saddle, `half` mm to each side, in coarser cells and as first planned: a correction
+/// costs streamlines what their border asks for.
 fn small_saddle(half: u32) -> String {
     let scene = scene("saddle").replace("[-20.0, 20.0]", &format!("[-{half}.0, {half}.0]"));
     let scene = scene.replace("cell = 0.1", "cell = 0.2");
@@ -190,8 +191,8 @@ fn streamlines_are_the_quickest_of_all_on_eight_surfaces() {
     assert!(failed.is_empty() && led >= LED_BY_STREAM_FUNCTIONS, "{table}\n{}", failed.join("\n"));
 }
 
-/// The scene with zigzag and the shortest streamlines only, their passes joined on the surface and with cells that are coarse: turns
-/// are those of the moves.
+/// The scene with zigzag and the shortest streamlines only, their passes joined on the surface and with cells
+/// that are coarse: turns are those of the moves.
 fn joined_on_the_surface(scene: &str) -> String {
     let (head, _) = scene.split_once("[[toolpath]]").unwrap();
     let coarse = |head: String, cell: &str| head.replace(cell, "cell = 0.5\nerror_bound = 1.0");
@@ -201,8 +202,9 @@ fn joined_on_the_surface(scene: &str) -> String {
     head + &zigzag + &toolpath("strategy = \"streamline\"\nobjective = \"length\"")
 }
 
-/// All turning of passes and of the links between them against the best zigzag's. Turns by more than 30 degrees are told besides: where
-/// passes meet a border at a few degrees, the way back along it begins with one, and times hold what it costs.
+/// All turning of passes and of the links between them against the best zigzag's. Turns by more than 30
+/// degrees are told besides: where passes meet a border at a few degrees, the way back along it begins with
+/// one, and times hold what it costs.
 fn turn_less_than_zigzag(scenes: &[(&str, String)]) {
     let mut table = String::from(
         "\nsurface          turning, rad: zigzag  streamline  sharp turns: zigzag  streamline\n",
@@ -233,7 +235,8 @@ fn streamlines_turn_less_than_zigzag_on_eight_surfaces() {
     turn_less_than_zigzag(&SURFACES.map(|name| (name, as_planned(name))));
 }
 
-/// On a twisted patch the quickest path is another than the shortest one with a price of turning, which the machine does not ask for.
+/// On a twisted patch the quickest path is another than the shortest one with a price of turning, which the
+/// machine does not ask for.
 #[test]
 fn the_quickest_streamlines_take_less_time_than_the_shortest() {
     let head = scene("twisted").replace("[tolerance]", "[tolerance]\ncorrect = false");

@@ -1,4 +1,5 @@
-//! What a verdict covers: surface that upright tools see, walls, undersides, and parts of which nothing is measured.
+//! What a verdict covers: surface that upright tools see, walls, undersides, and parts of which nothing is
+//! measured.
 
 use std::path::Path;
 
@@ -95,8 +96,9 @@ fn the_walls_of_a_box_in_a_larger_block_are_uncut_and_hold_without_a_margin() {
     assert_eq!(run(&block, "", "[stock]\nmargin = 1.5").0, 0, "walls are not judged by default");
 }
 
-/// A block of 6 x 4 x 3 mm without one upright edge: there it has a face from 0.1 mm aside at the foot to 0.2 mm at the top, with all its
-/// corners on the sides of the block, so that material stands between them alone. No pass comes there.
+/// A block of 6 x 4 x 3 mm without one upright edge: there it has a face from 0.1 mm aside at the foot to 0.2
+/// mm at the top, with all its corners on the sides of the block, so that material stands between them alone.
+/// No pass comes there.
 #[test]
 fn what_stands_between_never_cut_places_is_in_the_bound() {
     let ring = |aside: f64, z: f64| {
@@ -123,8 +125,8 @@ fn what_stands_between_never_cut_places_is_in_the_bound() {
     assert!(highest < truth + 1e-3 && highest + bound > truth, "{highest} {bound} {truth}");
 }
 
-/// Along the border of an offset surface normals lead out of the block at once, and moves go on beyond it: what they leave around there is
-/// known as well as elsewhere.
+/// Along the border of an offset surface normals lead out of the block at once, and moves go on beyond it:
+/// what they leave around there is known as well as elsewhere.
 #[test]
 fn what_moves_leave_at_the_side_of_the_block_is_bounded() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sources/offset_12.toml");

@@ -1,4 +1,5 @@
-//! One cutter under the words of several families: what it plans, cuts and measures is a matter of its profile.
+//! One cutter under the words of several families: what it plans, cuts and measures is a matter of its
+//! profile.
 
 use millstream::cutter::{AptWords, Cutter};
 use millstream::drop_cutter::DropCutter;
@@ -95,8 +96,8 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     assert!(bull == ball && apt == ball);
 }
 
-/// Where the surface turns from rising to falling, a flat swings to its other side. No place of any move lies below the cutter
-/// that is dropped there.
+/// Where the surface turns from rising to falling, a flat swings to its other side. No place of any move lies
+/// below the cutter that is dropped there.
 #[test]
 fn a_flat_that_swings_to_its_other_side_is_carried_over_the_part() {
     let hill = |x: f64, y: f64, wide: f64| (-(x * x + y * y) / (2.0 * wide * wide)).exp();
@@ -128,8 +129,8 @@ fn deepest(part: &Part, cutter: &Cutter, strategy: &dyn Strategy, settings: &Pla
     places.map(below).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Passes that lie far apart roll over a corner of the part until the corner of the cutter stands upright on it: a chord that is off by
-/// little cuts it deeper by much.
+/// Passes that lie far apart roll over a corner of the part until the corner of the cutter stands upright on
+/// it: a chord that is off by little cuts it deeper by much.
 #[test]
 fn rolls_over_corners_cut_them_no_deeper_than_chords_may() {
     let plane = AnalyticShape::Plane { height: 0.0 };

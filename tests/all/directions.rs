@@ -87,8 +87,8 @@ fn sampled_circles_are_followed_by_every_method_and_solver() {
     }
 }
 
-/// Streamlines traced by Runge-Kutta steps are as round as the levels of the same function, on a chart and on a mesh, lie no farther
-/// apart than they may, and leave nothing.
+/// Streamlines traced by Runge-Kutta steps are as round as the levels of the same function, on a chart and on
+/// a mesh, lie no farther apart than they may, and leave nothing.
 #[test]
 fn traced_lines_are_levels() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);
@@ -119,7 +119,8 @@ fn traced_lines_are_levels() {
     }
 }
 
-/// Circles that leaving is dear are kept to within a degree, or else the plan says how far its passes are off.
+/// Circles that leaving is dear are kept to within a degree, or else the plan says how far its passes are
+/// off.
 #[test]
 fn circles_are_followed_or_said_not_to_be() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);

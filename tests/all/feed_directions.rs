@@ -1,4 +1,5 @@
-//! Feed directions of slopes, curves, borders, blends and samples, on charts and on meshes, against closed forms.
+//! Feed directions of slopes, curves, borders, blends and samples, on charts and on meshes, against closed
+//! forms.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
@@ -61,8 +62,8 @@ fn fields(
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).unwrap().field.unwrap()
 }
 
-/// Share of the cutting length within a rectangle of the plan view that is off the wanted direction, a function of the
-/// place, by more than `most` rad.
+/// Share of the cutting length within a rectangle of the plan view that is off the wanted direction, a
+/// function of the place, by more than `most` rad.
 fn share_off(path: &Toolpath, [x, y]: [[f64; 2]; 2], most: f64, wanted: impl Fn(&Point3) -> f64) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);
     for (from, to) in path.moves.iter().zip(&path.moves[1..]) {
@@ -234,8 +235,8 @@ fn guides_off_the_part_are_refused_in_blends_as_well() {
     }
 }
 
-/// On a dome steepest lines are rays and heights are circles: both turn once around the top. A saddle's heights turn once
-/// the other way, and the borders of a rectangle once around it.
+/// On a dome steepest lines are rays and heights are circles: both turn once around the top. A saddle's
+/// heights turn once the other way, and the borders of a rectangle once around it.
 #[test]
 fn singular_points_are_named_with_their_index() {
     let dome = AnalyticShape::Sphere { height: 0.0, radius: 80.0, concave: false };
@@ -312,8 +313,8 @@ fn the_report_tells_singular_points_and_intervals() {
     assert!(page.contains("singular points with their index") && page.contains("Intervals of streamline"));
 }
 
-/// Between the shortest path and a wanted direction: the dearer passes square to it are, the nearer they keep to it and
-/// the longer the path is; on charts and on meshes.
+/// Between the shortest path and a wanted direction: the dearer passes square to it are, the nearer they keep
+/// to it and the longer the path is; on charts and on meshes.
 #[test]
 fn passes_keep_to_a_direction_as_far_as_it_is_worth() {
     let shape = AnalyticShape::Saddle { radius_concave: 20.0, radius_convex: 20.0 };

@@ -51,8 +51,8 @@ fn parts_are_those_of_their_generators() {
     }
 }
 
-/// Every edge of solid.stl is one of two triangles, once each way, by nothing but its coordinates. Nothing lies above the stock,
-/// and its volume is the figure's but for facets within voxels.
+/// Every edge of solid.stl is one of two triangles, once each way, by nothing but its coordinates. Nothing
+/// lies above the stock, and its volume is the figure's but for facets within voxels.
 fn its_solid_is_closed(path: &Value, results: &Path) {
     let name: String = path["name"].as_str().unwrap().replace(' ', "-");
     let folder = [name.as_str(), path["name"].as_str().unwrap()].map(|name| results.join(name));
@@ -155,7 +155,8 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     let pairs = leaning["clearance"]["pairs"].as_array().unwrap();
     let standing = pairs.iter().find(|pair| pair["other"] == "standing stock").unwrap();
     let [clearance, bound] = ["/clearance_mm", "/error_bound_mm"].map(|key| number(standing, key));
-    // A twentieth of it is left open, and the roughed stock lies 0.4 mm over the walls that the holder keeps 2 mm off.
+    // A twentieth of it is left open, and the roughed stock lies 0.4 mm over the walls that the holder keeps
+    // 2 mm off.
     assert!(
         standing["tool"] == "holder" && clearance > 1.5 && bound <= 0.05 * clearance + 1e-9,
         "{standing}"
@@ -184,7 +185,8 @@ fn a_holder_in_stock_that_still_stands_is_a_collision() {
     );
 }
 
-/// A bull nose end mill that leads by five degrees, on a patch and on its triangles, as first planned and measured.
+/// A bull nose end mill that leads by five degrees, on a patch and on its triangles, as first planned and
+/// measured.
 fn lead_on_patch_and_triangles(correct: bool) -> [Value; 2] {
     let home = tempfile::tempdir().unwrap();
     let n = 64;
@@ -286,8 +288,8 @@ fn rays_and_voxels_measure_what_the_z_map_does() {
     }
 }
 
-/// A program that feeds back and forth in one pass, in lines shorter than four radii. Its ridges end at the border between two
-/// places of the net: whatever their distance, the bounds hold them.
+/// A program that feeds back and forth in one pass, in lines shorter than four radii. Its ridges end at the
+/// border between two places of the net: whatever their distance, the bounds hold them.
 #[test]
 fn what_stands_at_a_border_between_two_places_is_found() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sources/location.toml");

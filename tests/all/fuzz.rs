@@ -1,5 +1,5 @@
-//! What the fuzz targets do, without a fuzzer: their seeds and all that once failed, every day; cases made by chance from
-//! these, every night.
+//! What the fuzz targets do, without a fuzzer: their seeds and all that once failed, every day; cases made by
+//! chance from these, every night.
 
 #[path = "../../fuzz/bodies/lib.rs"]
 mod bodies;
@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use bodies::{TARGETS, Target};
 
-/// Cases of each target in the nightly test. `MILLSTREAM_FUZZ_CASES` asks for another number, `MILLSTREAM_FUZZ_TARGET` for one
-/// target only.
+/// Cases of each target in the nightly test. `MILLSTREAM_FUZZ_CASES` asks for another number,
+/// `MILLSTREAM_FUZZ_TARGET` for one target only.
 const CASES: usize = 20_000;
 
 /// Longest input that is made, bytes.

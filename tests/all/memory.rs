@@ -10,15 +10,15 @@ use super::support::{height_mesh, write_stl};
 /// Memory that the scenes here allow, MiB.
 const ALLOWED: u64 = 64;
 
-/// What may come on top, MiB: stacks, tables, and what the allocator keeps. A run whose cells took twice what is counted for
-/// them would exceed it by far.
+/// What may come on top, MiB: stacks, tables, and what the allocator keeps. A run whose cells took twice what
+/// is counted for them would exceed it by far.
 const BESIDES: u64 = 12;
 
 /// What a run may take between two looks at its memory, MiB.
 const SLACK: u64 = 12;
 
-/// Memory that a process has written to and holds, MiB; `None` once it has ended. Pages of the program's own file are no
-/// demand, because the system takes them back.
+/// Memory that a process has written to and holds, MiB; `None` once it has ended. Pages of the program's own
+/// file are no demand, because the system takes them back.
 fn held(process: &Child) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).ok()?;
     let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
@@ -54,8 +54,8 @@ fn plate(cell: f64) -> String {
     )
 }
 
-/// The message of a grid that does not fit names the finest cell that does. A run with it takes all that is allowed,
-/// and no more.
+/// The message of a grid that does not fit names the finest cell that does. A run with it takes all that is
+/// allowed, and no more.
 #[test]
 fn a_run_stays_within_the_memory_that_was_allowed() {
     let (home, process) = start(&plate(0.02));

@@ -1,5 +1,5 @@
-//! What a run does to the files that it finds: it replaces those of an earlier run and nothing else, and a kill leaves the
-//! old or the new results.
+//! What a run does to the files that it finds: it replaces those of an earlier run and nothing else, and a
+//! kill leaves the old or the new results.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -135,8 +135,8 @@ fn the_list_of_a_run_is_complete() {
     whole(&home.path().join("out"), "Plate");
 }
 
-/// Results are whole: those that the list names, and no others, are there with their digests, and the report has this
-/// title.
+/// Results are whole: those that the list names, and no others, are there with their digests, and the report
+/// has this title.
 fn whole(out: &Path, title: &str) {
     let list = std::fs::read_to_string(out.join("millstream.sha256")).unwrap();
     let mut listed = BTreeSet::from(["millstream.sha256".to_owned()]);
@@ -155,8 +155,8 @@ fn title_of(out: &Path) -> String {
     report["title"].as_str().unwrap().to_owned()
 }
 
-/// Kills runs at moments all over their publishing. The old or the new results are there, whole, at once and after
-/// the next run.
+/// Kills runs at moments all over their publishing. The old or the new results are there, whole, at once and
+/// after the next run.
 #[cfg(unix)]
 #[test]
 fn a_killed_run_leaves_old_or_new_results() {

@@ -47,7 +47,8 @@ fn farthest(from: &Toolpath, to: &Toolpath) -> f64 {
     fed.map(|m| nearest(&m.to.tip)).fold(0.0, f64::max)
 }
 
-/// The program with arcs, read back, stays as near to the moves, which the locations in APT are, as it was asked to.
+/// The program with arcs, read back, stays as near to the moves, which the locations in APT are, as it was
+/// asked to.
 #[test]
 fn arcs_of_a_program_stay_at_the_moves() {
     let home = tempfile::tempdir().unwrap();
@@ -82,8 +83,9 @@ fn sides_at_the_edge_of_the_stock_are_open() {
     assert!((engaged(&at_edge) - engaged(&listed)).abs() < 1e-9);
 }
 
-/// In a neck as wide as the cutter the engagement is exceeded: the toolpath fails, and the stretches are listed. They lie where the
-/// neck is, make up the share that is reported, and hold the greatest angle; the program has their lines.
+/// In a neck as wide as the cutter the engagement is exceeded: the toolpath fails, and the stretches are
+/// listed. They lie where the neck is, make up the share that is reported, and hold the greatest angle; the
+/// program has their lines.
 #[test]
 fn stretches_above_the_engagement_are_listed() {
     let home = tempfile::tempdir().unwrap();
@@ -103,7 +105,8 @@ fn stretches_above_the_engagement_are_listed() {
     assert!(lengths.is_sorted_by(|a, b| a >= b));
     let greatest = all.iter().map(|one| number(one, "max_engagement_deg")).fold(0.0, f64::max);
     assert_eq!(greatest, number(pocket, "max_engagement_deg"));
-    // The slot is the neck, but for where its mouths are cleared by loops; others are the last of loops before it.
+    // The slot is the neck, but for where its mouths are cleared by loops; others are the last of loops
+    // before it.
     let longest = &all[0];
     let neck = (13.5..24.5).contains(&number(longest, "x"));
     assert!(neck && (4.0..=10.0).contains(&number(longest, "length_mm")), "{longest}");
@@ -133,7 +136,8 @@ fn stretches_above_the_engagement_are_listed() {
     assert!(page.contains("Stretches above the engagement") && page.contains("greatest with thin chips"));
 }
 
-/// Straight walls have no chords: however coarse those of the passes may be, what they cut beyond the walls is known.
+/// Straight walls have no chords: however coarse those of the passes may be, what they cut beyond the walls
+/// is known.
 #[test]
 fn straight_walls_are_judged_with_coarse_chords() {
     let home = tempfile::tempdir().unwrap();
@@ -147,8 +151,9 @@ fn straight_walls_are_judged_with_coarse_chords() {
     assert!(gouge < 1e-4 && bound < 1e-5, "{gouge} {bound}");
 }
 
-/// Inner passes that lie far apart turn more sharply than the cutter reaches around: what they leave gets a pass of its own. Without it
-/// 0.005 mm² stand in the first pocket, 1.2 mm² in the second, as high as it is deep.
+/// Inner passes that lie far apart turn more sharply than the cutter reaches around: what they leave gets a
+/// pass of its own. Without it 0.005 mm² stand in the first pocket, 1.2 mm² in the second, as high as it is
+/// deep.
 #[test]
 fn what_passes_far_apart_leave_is_cut() {
     let slot = "outline = [[0, 0], [40, 0], [40, 30], [25, 30], [25, 12], [15, 12], [15, 30], [0, 30]]";
@@ -185,7 +190,8 @@ fn violations(toolpath: &Value) -> Vec<String> {
     all.map(|one| one["text"].as_str().unwrap().to_owned()).collect()
 }
 
-/// A program of another system in a square pocket of 20 mm: passes along the walls, `corner` by `far` mm, and between them.
+/// A program of another system in a square pocket of 20 mm: passes along the walls, `corner` by `far` mm, and
+/// between them.
 fn program_of(corner: f64, far: f64) -> String {
     let end = 20.0 - corner;
     format!(
@@ -194,7 +200,8 @@ fn program_of(corner: f64, far: f64) -> String {
     )
 }
 
-/// Walls and islands are judged under a program from elsewhere as under ours: what is cut beyond them, and what is left on them.
+/// Walls and islands are judged under a program from elsewhere as under ours: what is cut beyond them, and
+/// what is left on them.
 #[test]
 fn programs_are_held_against_walls_and_islands() {
     let home = tempfile::tempdir().unwrap();
@@ -236,7 +243,8 @@ fn programs_are_held_against_walls_and_islands() {
     assert!(code == Some(1) && island["pocket"]["wall_gouge_mm"].as_f64().unwrap() > 4.0, "{island}");
 }
 
-/// A program comes from beside the block, over an open side, with a cutter that is small beside the margin of the stock. Nothing stands there.
+/// A program comes from beside the block, over an open side, with a cutter that is small beside the margin of
+/// the stock. Nothing stands there.
 #[test]
 fn programs_come_in_over_open_sides() {
     let home = tempfile::tempdir().unwrap();
@@ -291,7 +299,8 @@ fn material_left_on_round_walls_is_judged() {
     assert_eq!(of(0.2).0, Some(0));
 }
 
-/// Where the way down leads through ground that is cleared, or beyond an open side, it may be as steep as it likes.
+/// Where the way down leads through ground that is cleared, or beyond an open side, it may be as steep as it
+/// likes.
 #[test]
 fn ways_down_through_air_may_be_steep() {
     let home = tempfile::tempdir().unwrap();
@@ -310,8 +319,8 @@ fn ways_down_through_air_may_be_steep() {
     assert_eq!((code, violations(&stepped)), (Some(0), Vec::new()));
 }
 
-/// Chords of a drawn curve cut its inside, and beside an island of a drawing the cutter comes so much nearer: the bound holds it, the table
-/// tells it, and it stays far below the limit.
+/// Chords of a drawn curve cut its inside, and beside an island of a drawing the cutter comes so much nearer:
+/// the bound holds it, the table tells it, and it stays far below the limit.
 #[test]
 fn what_chords_of_drawings_are_off_is_in_the_bounds() {
     let home = tempfile::tempdir().unwrap();
@@ -342,8 +351,8 @@ fn what_chords_of_drawings_are_off_is_in_the_bounds() {
     assert!(told.parse::<f64>().unwrap() >= 1e3 * (cut - depth) - 0.01, "{row}");
 }
 
-/// A flat that cuts all of the floor but goes round one place leaves a post there, thinner than a cell. Its height is the depth; a
-/// circle through that place leaves nothing.
+/// A flat that cuts all of the floor but goes round one place leaves a post there, thinner than a cell. Its
+/// height is the depth; a circle through that place leaves nothing.
 #[test]
 fn a_post_thinner_than_a_cell_is_uncut() {
     let home = tempfile::tempdir().unwrap();
@@ -382,7 +391,8 @@ fn a_post_thinner_than_a_cell_is_uncut() {
     }
 }
 
-/// The highest ridge of a ball on a pocket's floor is told within its bound on cells of any size, as the moves themselves leave it.
+/// The highest ridge of a ball on a pocket's floor is told within its bound on cells of any size, as the
+/// moves themselves leave it.
 #[test]
 fn ridges_in_pockets_do_not_depend_on_cells() {
     let home = tempfile::tempdir().unwrap();

@@ -34,7 +34,8 @@ fn a_finish_begins_with_what_roughing_left() {
     let (code, report) = run(home.path(), &scene);
     assert_eq!(code, Some(0), "{report}");
     let [rough, finish, alone] = [0, 1, 2].map(|k| &report["toolpaths"][k]);
-    // What roughing leaves is the finish's to take, and said to be; both together take what the finish takes alone.
+    // What roughing leaves is the finish's to take, and said to be; both together take what the finish takes
+    // alone.
     assert!(number(rough, "/excess/max_mm") > 0.17, "{}", rough["excess"]);
     assert!(rough["notes"].to_string().contains("judged after finish"), "{}", rough["notes"]);
     assert!(!finish["notes"].to_string().contains("judged after"), "{}", finish["notes"]);
@@ -73,7 +74,8 @@ fn a_gouge_of_an_earlier_toolpath_is_named() {
     assert!(text.contains("of the toolpath rough before this one, line 6"), "{text}");
 }
 
-/// What a toolpath left to one that could not be planned is its own: it fails. Behind one that passes, roughing is not the fastest.
+/// What a toolpath left to one that could not be planned is its own: it fails. Behind one that passes,
+/// roughing is not the fastest.
 #[test]
 fn toolpaths_in_turn_answer_for_what_they_leave_together() {
     let home = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Programs from elsewhere through the real command: a sound one passes, planted faults are found with their lines.
+//! Programs from elsewhere through the real command: a sound one passes, planted faults are found with their
+//! lines.
 
 use std::path::Path;
 
@@ -107,7 +108,8 @@ fn a_sound_program_passes_in_every_format() {
     assert!(html.stdout.starts_with("<!DOCTYPE html>"), "{}", &html.stdout[..100]);
 }
 
-/// The raster the other way: lines shorter than four radii, fed back and forth without a rapid, are tracks of their own.
+/// The raster the other way: lines shorter than four radii, fed back and forth without a rapid, are tracks of
+/// their own.
 #[test]
 fn ridges_between_short_lines_of_one_pass_are_found() {
     let mut program = raster()[..9].to_vec();
@@ -367,8 +369,8 @@ fn an_arc_is_judged_and_not_its_chords() {
     assert!(depth - bound > 0.005 && answer.code == Some(1), "{}", answer.stdout);
 }
 
-/// FreeCAD's program for a block with a pocket, a boss and holes. Its arcs are 7 to 8 µm too near to the boss, and its pocket
-/// leaves islands and corners: so says a union of the discs of all moves, too.
+/// FreeCAD's program for a block with a pocket, a boss and holes. Its arcs are 7 to 8 µm too near to the
+/// boss, and its pocket leaves islands and corners: so says a union of the discs of all moves, too.
 #[test]
 fn a_prismatic_part_is_judged_with_its_walls() {
     let home = tempfile::tempdir().unwrap();
@@ -615,7 +617,8 @@ fn a_fault_of_any_tool_is_named_with_line_and_tool() {
     let gouge = &report["toolpaths"][0]["gouge"];
     assert!((gouge["max_depth_mm"].as_f64().unwrap() - 0.2).abs() < 0.002, "{gouge}");
     assert_eq!((&gouge["regions"][0]["line"], &gouge["regions"][0]["tool"]), (&line.into(), &2.into()));
-    // A rapid of the first tool through the block that stands then, and one of the second through what the first left.
+    // A rapid of the first tool through the block that stands then, and one of the second through what the
+    // first left.
     let mut rapid = sound.clone();
     let feed = line_of(&sound, "X26");
     rapid[feed - 1] = "G0 X26\nG1".to_owned();
@@ -726,8 +729,8 @@ fn removed_of_bar() -> f64 {
     centres(-6.0, 14.0).map(|y| removed(8.0, y)).sum::<f64>() * pitch * SIZE[0]
 }
 
-/// Where the raster of half of the plate ends, a round bar stands as high as its closed form, and a rapid beside its top is in
-/// the air; in the block around it the same rapid cuts.
+/// Where the raster of half of the plate ends, a round bar stands as high as its closed form, and a rapid
+/// beside its top is in the air; in the block around it the same rapid cuts.
 #[test]
 fn stock_has_its_own_shape() {
     let home = tempfile::tempdir().unwrap();
@@ -854,7 +857,8 @@ fn stock_of_a_mesh_is_measured_as_the_same_block() {
     assert!(answer.stderr.contains("4.000 mm out of its stock at x 16.000"), "{}", answer.stderr);
 }
 
-/// The start is where the machine is at home: no place higher than its travel is assumed for a program that goes there first.
+/// The start is where the machine is at home: no place higher than its travel is assumed for a program that
+/// goes there first.
 #[test]
 fn a_program_from_the_top_of_a_machine_keeps_within_its_travel() {
     let home = tempfile::tempdir().unwrap();

@@ -133,7 +133,8 @@ fn scallop(distance: f64) -> f64 {
     0.1 - (0.01 - 0.25 * distance * distance).sqrt()
 }
 
-/// Every second pass lies between the rows of cells, which see the others only: the ridges are those of all passes.
+/// Every second pass lies between the rows of cells, which see the others only: the ridges are those of all
+/// passes.
 #[test]
 fn passes_between_the_cells_leave_their_ridges() {
     let m = dip(0.0, CELLS);

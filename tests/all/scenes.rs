@@ -223,8 +223,8 @@ fn streamlines_of_a_wide_cutter_do_not_cut_across_a_corner() {
     assert!(number(gouge, "/max_depth_mm") + number(gouge, "/error_bound_mm") <= 0.15, "{gouge}");
 }
 
-/// The ball touches both sides of each crease, at r tan(δ/2) beside it, δ the angle between the sides' normals; there the
-/// crease lies r (1 − √(1 − tan²(δ/2))) below it along either normal.
+/// The ball touches both sides of each crease, at r tan(δ/2) beside it, δ the angle between the sides'
+/// normals; there the crease lies r (1 − √(1 − tan²(δ/2))) below it along either normal.
 fn creases_have_passes_of_their_own((status, report): (i32, Value)) {
     assert_eq!(status, 0);
     assert_good("pan", &report);
@@ -254,7 +254,8 @@ fn creases_of_a_mesh_have_passes_of_their_own_leaning_as_well() {
     creases_have_passes_of_their_own(run("pan.toml"));
 }
 
-/// A hole whose rim has slivers folded under it: the ball does not climb into it, and the target is held everywhere.
+/// A hole whose rim has slivers folded under it: the ball does not climb into it, and the target is held
+/// everywhere.
 #[test]
 fn an_offset_surface_ends_at_the_rim_of_a_hole() {
     let home = tempfile::tempdir().unwrap();
@@ -293,7 +294,8 @@ fn coarse_chords_fail_for_their_gouges() {
     assert!(number(region, "/line") > 1.0);
 }
 
-/// Nothing is gouged, on the floor or beyond the walls, nothing is left but in corners, and no rapid runs in stock.
+/// Nothing is gouged, on the floor or beyond the walls, nothing is left but in corners, and no rapid runs in
+/// stock.
 fn is_cleared_to_its_walls(pocket: &str, (status, report): &(i32, Value)) {
     assert_eq!(*status, 0, "{pocket}");
     for t in report["toolpaths"].as_array().unwrap() {
@@ -330,9 +332,9 @@ fn a_pocket_with_islands_is_cleared_by_smooth_flow_as_well() {
     flow_is_smoother_than_offsets(&run("bracket.toml"));
 }
 
-/// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or little of one.
-/// Passes from vectors, along walls and from guides clear a pocket with an island, and keep to what was asked for where nothing
-/// turns around a point.
+/// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or
+/// little of one. Passes from vectors, along walls and from guides clear a pocket with an island, and keep to
+/// what was asked for where nothing turns around a point.
 #[test]
 fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
     let (status, report) = run("sources/pocket_vectors.toml");
@@ -340,7 +342,8 @@ fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
     assert_eq!((status, toolpaths.len()), (0, 5));
     for t in toolpaths {
         assert_eq!(number(t, "/uncut/area_mm2"), 0.0, "{}", t["name"]);
-        // Walls askew are met to the decimals of the program; the ends of traced lines to a tenth of the chord tolerance.
+        // Walls askew are met to the decimals of the program; the ends of traced lines to a tenth of the
+        // chord tolerance.
         let most = if t["name"] == "vectors, traced" { 0.1 * 0.005 } else { 5e-5 };
         assert!(number(t, "/pocket/wall_gouge_mm") < most, "{}", t["name"]);
     }

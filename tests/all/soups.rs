@@ -1,5 +1,5 @@
-//! Meshes that are no surface: upright cutters plan on them and measure them, what needs two sides refuses them, and what
-//! nobody saw is never passed.
+//! Meshes that are no surface: upright cutters plan on them and measure them, what needs two sides refuses
+//! them, and what nobody saw is never passed.
 
 use std::path::Path;
 
@@ -92,8 +92,9 @@ fn drafted_block([x, y, z]: [f64; 3], draft: f64) -> Vec<[Point3; 3]> {
     (0..4).flat_map(wall).chain(quad(a, b, c, d)).collect()
 }
 
-/// Walls that lean by half a degree to three are a narrow band seen from above. Contours follow them, one strip from the next, and with
-/// another strategy on the top the part passes, every place of it measured; the contours alone leave the top, and say so.
+/// Walls that lean by half a degree to three are a narrow band seen from above. Contours follow them, one
+/// strip from the next, and with another strategy on the top the part passes, every place of it measured; the
+/// contours alone leave the top, and say so.
 #[test]
 fn walls_of_a_mesh_that_the_plan_view_hardly_shows_are_cut_and_judged() {
     for draft in [0.5, 3.0] {
@@ -130,8 +131,8 @@ fn walls_of_a_mesh_that_the_plan_view_hardly_shows_are_cut_and_judged() {
     }
 }
 
-/// Waterlines of a flat end show no ridge in the plan view: what they leave on walls of 3 degrees is measured along the normals, and
-/// corrected where it stands too high, in the stock that the toolpath on the top left.
+/// Waterlines of a flat end show no ridge in the plan view: what they leave on walls of 3 degrees is measured
+/// along the normals, and corrected where it stands too high, in the stock that the toolpath on the top left.
 #[test]
 fn what_toolpaths_leave_together_is_corrected() {
     let home = tempfile::tempdir().unwrap();
@@ -147,8 +148,8 @@ fn what_toolpaths_leave_together_is_corrected() {
     assert!(rounds.len() > 1 && highest(0) > 0.01 && highest(rounds.len() - 1) < 0.01, "{rounds:?}");
 }
 
-/// A zigzag for the top of such a block and contours for its walls, each asked for by its slopes: both pass, in a fraction of the time
-/// of a zigzag that brings its passes as near as the walls ask for.
+/// A zigzag for the top of such a block and contours for its walls, each asked for by its slopes: both pass,
+/// in a fraction of the time of a zigzag that brings its passes as near as the walls ask for.
 #[test]
 fn level_ground_and_walls_are_shared_by_slope() {
     let home = tempfile::tempdir().unwrap();
@@ -172,7 +173,8 @@ fn level_ground_and_walls_are_shared_by_slope() {
     assert!(shared < 45.0, "{shared}");
 }
 
-/// A frustum a hundred metres from the origin, where coordinates are known to some 1e-11 mm, is measured as one beside it.
+/// A frustum a hundred metres from the origin, where coordinates are known to some 1e-11 mm, is measured as
+/// one beside it.
 #[test]
 fn far_from_the_origin_a_part_is_measured_as_beside_it() {
     let scene = SCENE.replace("part.stl", "part.obj").replace("diameter = 6", "diameter = 2");

@@ -138,8 +138,8 @@ fn a_blade_can_be_turned_and_moved() {
     assert!((p - q).norm() < 1e-12);
 }
 
-/// A section with a bump of 20 µm at one point: faired by what is published, it lies off its drawing where the bump was, by no more
-/// than the bump moved.
+/// A section with a bump of 20 µm at one point: faired by what is published, it lies off its drawing where
+/// the bump was, by no more than the bump moved.
 #[test]
 fn what_fairing_moved_is_told_as_a_distance_from_the_drawing() {
     let mut outline = oval([12.0, 2.0], 0.0, 1.0);
@@ -159,8 +159,8 @@ fn what_fairing_moved_is_told_as_a_distance_from_the_drawing() {
     assert!(drawn.sections.iter().all(|section| section.off_drawing().is_none()));
 }
 
-/// One point far off its neighbours stays off: fairing moves no point much farther than the noise of all. That is told with its place, also
-/// without fairing. Noise, and corners that all sections have, are not.
+/// One point far off its neighbours stays off: fairing moves no point much farther than the noise of all.
+/// That is told with its place, also without fairing. Noise, and corners that all sections have, are not.
 #[test]
 fn a_point_off_its_neighbours_is_told() {
     let step = crate::fairing::JUMP_REMOVING_STEP;

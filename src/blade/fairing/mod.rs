@@ -8,8 +8,8 @@
 //! nothing of the long waves that are left: the curvature comb shows those.
 //!
 //! Parameters stay as they are while points move, so that before and after are measured alike and the work is
-//! linear; chords change by twice the cap at most. Whoever wants chord lengths again interpolates the moved points
-//! anew.
+//! linear; chords change by twice the cap at most. Whoever wants chord lengths again interpolates the moved
+//! points anew.
 //!
 //! All methods move one unknown at a time, the worst first ([`FairingMethod`]); each finds the best place of
 //! its unknown within the discs of all points that it moves, so that a point on its cap still slides along it
@@ -37,7 +37,8 @@ use relaxation::{Relaxation, State, Unknown};
 /// Rounds at most. Moves grow slower and slower as waves grow longer; what is left after so many is shape.
 const MOST_ROUNDS: usize = 1000;
 
-/// No point is moved by more than this many times the noise of the points: what a curve shows besides is shape.
+/// No point is moved by more than this many times the noise of the points: what a curve shows besides is
+/// shape.
 const MOST_NOISE: f64 = 2.0;
 
 /// Least cap, mm, of a curve without noise.
@@ -62,8 +63,8 @@ pub enum FairingMethod {
     /// The control point whose move lowers the jump energy most goes to where it is least (Eck and
     /// Hadenfeldt).
     Energy,
-    /// The worst point goes to its corrected place, one a round, until the greatest distance hardly changes: as published
-    /// by the second source of this project.
+    /// The worst point goes to its corrected place, one a round, until the greatest distance hardly changes:
+    /// as published by the second source of this project.
     Published {
         /// Points on each side between which the corrected place is sought: 1 for Kjellander's.
         neighbours: usize,
@@ -77,8 +78,9 @@ pub struct Fairing {
     pub method: FairingMethod,
     /// How far any point may end from its first place, mm, above 0.
     pub most_displacement: f64,
-    /// It ends when no point has moved further than this in a round of as many moves as there are unknowns, mm. A 250th of the
-    /// cap leaves long waves only, which are shape. What is published has a rule of its own.
+    /// It ends when no point has moved further than this in a round of as many moves as there are unknowns,
+    /// mm. A 250th of the cap leaves long waves only, which are shape. What is published has a rule of its
+    /// own.
     pub least_movement: f64,
 }
 
@@ -164,8 +166,8 @@ impl Fairing {
         Self { method, most_displacement, least_movement: 0.004 * most_displacement }
     }
 
-    /// By a method, no point further than `most_displacement`, mm, nor than twice the noise of the curve: a smooth one
-    /// stays. What is published knows nothing of noise.
+    /// By a method, no point further than `most_displacement`, mm, nor than twice the noise of the curve: a
+    /// smooth one stays. What is published knows nothing of noise.
     pub fn of_noise(method: FairingMethod, most_displacement: f64, spline: &CubicSpline) -> Self {
         let most = match method {
             FairingMethod::Published { .. } => most_displacement,

@@ -8,14 +8,16 @@ const BESIDE: usize = 2;
 /// Fewer points tell nothing.
 const LEAST_POINTS: usize = 9;
 
-/// The standard deviation of noise in a plane over the median of what is seen of it: noise along the curve moves the chord
-/// lengths as well, so only that across it is seen, and half of a normal distribution lies within 0.6745 of its deviation.
+/// The standard deviation of noise in a plane over the median of what is seen of it: noise along the curve
+/// moves the chord lengths as well, so only that across it is seen, and half of a normal distribution lies
+/// within 0.6745 of its deviation.
 const OVER_MEDIAN: f64 = std::f64::consts::SQRT_2 / 0.674_49;
 
-/// The standard deviation (in the plane's norm, mm) of the noise of a spline's points; infinite where they are too few to tell.
+/// The standard deviation (in the plane's norm, mm) of the noise of a spline's points; infinite where they
+/// are too few to tell.
 ///
-/// Each point is compared with the cubic through its four neighbours at its parameter. The median over all points is taken:
-/// round ends, where the curve itself leaves such cubics, are few.
+/// Each point is compared with the cubic through its four neighbours at its parameter. The median over all
+/// points is taken: round ends, where the curve itself leaves such cubics, are few.
 pub fn noise(spline: &CubicSpline) -> f64 {
     let n = spline.points().len();
     if n < LEAST_POINTS {
@@ -34,8 +36,9 @@ pub fn noise(spline: &CubicSpline) -> f64 {
 /// Noise leaves a point that counts as an outlier once in so many tables.
 const TABLES: f64 = 1e6;
 
-/// The point that lies off its neighbours by more than the noise of all of them, and how far, mm: the farthest of those whose neighbours
-/// are off the other way, and less, because of it. Where the curve itself bends sharply they are off the same way.
+/// The point that lies off its neighbours by more than the noise of all of them, and how far, mm: the
+/// farthest of those whose neighbours are off the other way, and less, because of it. Where the curve itself
+/// bends sharply they are off the same way.
 pub fn outlier(spline: &CubicSpline) -> Option<(usize, f64)> {
     let n = spline.points().len();
     if n < LEAST_POINTS {
@@ -60,8 +63,9 @@ pub fn outlier(spline: &CubicSpline) -> Option<(usize, f64)> {
 /// Points of a table are rounded to this, mm, in any case.
 const ROUNDED: f64 = 1e-3;
 
-/// How far a point lies from the cubic through its four neighbours at its parameter, mm, and how much the noise of all five adds up
-/// to in that. Open splines have no four neighbours for the first and last two points.
+/// How far a point lies from the cubic through its four neighbours at its parameter, mm, and how much the
+/// noise of all five adds up to in that. Open splines have no four neighbours for the first and last two
+/// points.
 fn off_neighbours(spline: &CubicSpline, k: usize) -> (Vector2, f64) {
     let (n, t, p) = (spline.points().len(), spline.parameters(), spline.points());
     let period = if spline.is_closed() { t[n] - t[0] } else { 0.0 };

@@ -1,12 +1,13 @@
 //! Fairing as the second source of this project publishes it: the worst point moves, one a round.
 //!
-//! The worst point is the one that is farthest from its corrected place. It goes there, and the curve is interpolated again.
-//! After at least 20 rounds that goes on until the greatest distance changes by less than 0.01 mm from one round to the next.
-//! The corrected place is Kjellander's, or with 2 j neighbours the one at the point's parameter on the cubic from the j-th point
-//! before to the j-th after it, with their tangents: of all curves with these ends it has the least `∫ |C″|²`.
+//! The worst point is the one that is farthest from its corrected place. It goes there, and the curve is
+//! interpolated again. After at least 20 rounds that goes on until the greatest distance changes by less than
+//! 0.01 mm from one round to the next. The corrected place is Kjellander's, or with 2 j neighbours the one at
+//! the point's parameter on the cubic from the j-th point before to the j-th after it, with their tangents:
+//! of all curves with these ends it has the least `∫ |C″|²`.
 //!
-//! The rule bounds neither what is left nor how far a point goes, so points stay within their cap here as well. It leaves more
-//! than the other methods do.
+//! The rule bounds neither what is left nor how far a point goes, so points stay within their cap here as
+//! well. It leaves more than the other methods do.
 
 use super::{Faired, FairingError, MOST_ROUNDS, displaced, jump_energy};
 use geometry::{CubicSpline, Vector2};
@@ -92,8 +93,8 @@ mod tests {
     use super::*;
     use geometry::Point2;
 
-    /// Points on a cubic are where their cubics want them, whatever the parameters; one that is off is moved back by what
-    /// Hermite's cubic between its neighbours says.
+    /// Points on a cubic are where their cubics want them, whatever the parameters; one that is off is moved
+    /// back by what Hermite's cubic between its neighbours says.
     #[test]
     fn points_on_a_cubic_stay_and_one_that_is_off_goes_back() {
         let t: Vec<f64> = [0.0, 1.0, 1.7, 2.9, 4.0, 4.6, 6.0, 7.1, 8.0].to_vec();

@@ -267,8 +267,8 @@ fn a_noisy_section_loses_its_jumps_within_the_cap() {
     }
 }
 
-/// Sections as a table has them, with decimals of a thousandth or a tenth of that: no point of them moves by a tenth of the cap.
-/// With noise the cap is the user's.
+/// Sections as a table has them, with decimals of a thousandth or a tenth of that: no point of them moves by
+/// a tenth of the cap. With noise the cap is the user's.
 #[test]
 fn smooth_sections_stay_within_a_tenth_of_the_cap() {
     const CAP: f64 = 0.02;

@@ -1,22 +1,26 @@
 //! Surfaces through offset sections.
 //!
-//! Enters: sections and a distance, mm. Leaves: one surface for each stretch between the corners at which offsets are
-//! trimmed. Where only some of the sections have a corner, the others are broken at the corresponding place: at the share of
-//! the section's length (of the curve that is offset) that lies between those of the corners above and below, or the same as
-//! the nearest one. Neighbouring surfaces then share an edge that fades into a smooth line.
+//! Enters: sections and a distance, mm. Leaves: one surface for each stretch between the corners at which
+//! offsets are trimmed. Where only some of the sections have a corner, the others are broken at the
+//! corresponding place: at the share of the section's length (of the curve that is offset) that lies between
+//! those of the corners above and below, or the same as the nearest one. Neighbouring surfaces then share an
+//! edge that fades into a smooth line.
 //!
-//! Offset sections stand `d cos φ` off the surface instead of `d`, however many sections there are; φ is the angle between
-//! the surface's normal and the plane of the sections. [`offset::OffsetSurface`] is the true offset.
+//! Offset sections stand `d cos φ` off the surface instead of `d`, however many sections there are; φ is the
+//! angle between the surface's normal and the plane of the sections. [`offset::OffsetSurface`] is the true
+//! offset.
 
 use super::{LoftError, LoftSection, check, loft};
 use crate::loft::Loft;
 use geometry::ArcLength;
 use offset::{CurveOffset, OffsetPiece, offset_curve};
 
-/// Corners of neighbouring sections that lie farther apart than this share of the length are not the same one.
+/// Corners of neighbouring sections that lie farther apart than this share of the length are not the same
+/// one.
 const SAME_CORNER: f64 = 0.15;
 
-/// Corners of one section nearer to each other than this share of the length are refused: between them would be no stretch.
+/// Corners of one section nearer to each other than this share of the length are refused: between them would
+/// be no stretch.
 const APART: f64 = 1e-4;
 
 /// Offsets each section in its own plane by `distance`, mm, positive to the left of its sense, and lofts what
@@ -74,7 +78,8 @@ pub fn loft_of_offsets(
     (0..offsets[0].stretches.len()).map(surface).collect()
 }
 
-/// Where the corners after each stretch lie, as shares of the length of the section's curve; on closed ones from 0 to 1.
+/// Where the corners after each stretch lie, as shares of the length of the section's curve; on closed ones
+/// from 0 to 1.
 fn corner_shares(offset: &OffsetPiece, arc: &ArcLength, section: &LoftSection) -> Vec<f64> {
     if offset.stretches.iter().any(|s| s.is_closed()) {
         return Vec::new();

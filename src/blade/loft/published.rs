@@ -1,10 +1,12 @@
-//! The offset surface of sections as it was published for blades (second source of `scenes/sources`): points of each section by chord
-//! error, each moved along the section's normal in its plane, splines through them, and a loft at equal shares of their lengths.
+//! The offset surface of sections as it was published for blades (second source of `scenes/sources`): points
+//! of each section by chord error, each moved along the section's normal in its plane, splines through them,
+//! and a loft at equal shares of their lengths.
 //!
-//! Enters: sections, a distance and a chord error, mm. Leaves: one surface. Nothing is trimmed: where a section is as hollow as the
-//! distance, its offset turns back and crosses itself, and so does the surface. The number of shares is that of the longest list of points;
-//! how far the surface strays from the splines between them is told, and nothing is done about it. As [`super::loft_of_offsets`],
-//! which mends both, it lies `d cos φ` off the surface of the sections instead of `d`.
+//! Enters: sections, a distance and a chord error, mm. Leaves: one surface. Nothing is trimmed: where a
+//! section is as hollow as the distance, its offset turns back and crosses itself, and so does the surface.
+//! The number of shares is that of the longest list of points; how far the surface strays from the splines
+//! between them is told, and nothing is done about it. As [`super::loft_of_offsets`], which mends both, it
+//! lies `d cos φ` off the surface of the sections instead of `d`.
 
 use geometry::{CubicSpline, Point2, Vector2};
 use offset::CurveOffsetError;
@@ -14,7 +16,8 @@ use super::{FIRST_SPANS, Loft, LoftError, LoftSection, Skin, check};
 /// Points nearer to each other than this, mm, are one: around a centre of curvature many are.
 const SAME: f64 = 1e-9;
 
-/// Offsets each section in its own plane by `distance`, mm, positive to the left of its sense, untrimmed, and lofts what comes out.
+/// Offsets each section in its own plane by `distance`, mm, positive to the left of its sense, untrimmed, and
+/// lofts what comes out.
 ///
 /// # Errors
 /// See [`LoftError`].

@@ -126,7 +126,8 @@ fn offsets_of_sections_are_lofted() {
     );
 }
 
-/// Greatest difference from `distance`, mm, of places of surfaces at the heights of sections from their curves.
+/// Greatest difference from `distance`, mm, of places of surfaces at the heights of sections from their
+/// curves.
 fn off_distance(lofts: &[Loft], sections: &[LoftSection], distance: f64) -> f64 {
     let mut greatest: f64 = 0.0;
     for (k, section) in sections.iter().enumerate() {

@@ -113,8 +113,8 @@ impl NacaProfile {
     }
 
     /// The profile with the parabola ahead of the greatest camber, or that behind it, for the whole camber
-    /// line. The camber line's curvature jumps from one to the other, and both sides have a corner there; those
-    /// of this profile have none.
+    /// line. The camber line's curvature jumps from one to the other, and both sides have a corner there;
+    /// those of this profile have none.
     pub(super) fn continued(&self, ahead: bool) -> Self {
         Self { change: if ahead { f64::INFINITY } else { f64::NEG_INFINITY }, ..*self }
     }

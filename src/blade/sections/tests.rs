@@ -265,8 +265,8 @@ fn runs_into_both_sides(arc: &TailArc, profile: &NacaProfile) -> Result<(), Stri
 }
 
 /// The greatest camber, with its corner in both sides, lies where the arc would take over. With these easings
-/// no arc is tangent to both sides: each that is tangent to their stretches as they continue beyond the corner
-/// touches one of them beyond it.
+/// no arc is tangent to both sides: each that is tangent to their stretches as they continue beyond the
+/// corner touches one of them beyond it.
 #[test]
 fn a_trailing_edge_at_the_corners_of_the_sides_has_the_nearest_easing() {
     let profile =

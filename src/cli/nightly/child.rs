@@ -34,8 +34,8 @@ pub enum Stopped {
     Cancelled,
 }
 
-/// Runs a command to its end. Standard input stays open meanwhile, and standard error is kept. Leaves what it took; its
-/// `reference_s` is left at zero.
+/// Runs a command to its end. Standard input stays open meanwhile, and standard error is kept. Leaves what it
+/// took; its `reference_s` is left at zero.
 ///
 /// # Errors
 /// [`Stopped`] unless the process ends with status 0 or 1.

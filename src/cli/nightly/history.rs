@@ -46,8 +46,8 @@ fn read(file: &mut fs::File, path: &Path) -> Result<(History, bool), CliError> {
 
 /// Adds a night to the history, unless it is there; leaves the whole history.
 ///
-/// The file is locked meanwhile, so that two nightlies take turns. Where the file system knows no locks, a line is still
-/// written at once and at the end. A line that a kill cut short is left as it is.
+/// The file is locked meanwhile, so that two nightlies take turns. Where the file system knows no locks, a
+/// line is still written at once and at the end. A line that a kill cut short is left as it is.
 ///
 /// # Errors
 /// [`CliError::Output`], and [`CliError::InTheWay`] where the file is something else.

@@ -47,7 +47,8 @@ impl Plan {
     /// Finds the scenes and what the rules check.
     ///
     /// # Errors
-    /// [`CliError`] where there is no scene, a name is not unique, or rules or published figures name a scene that is not there.
+    /// [`CliError`] where there is no scene, a name is not unique, or rules or published figures name a scene
+    /// that is not there.
     pub fn new(
         options: &NightlyOptions,
         rules: &Rules,
@@ -155,8 +156,8 @@ fn search(folder: &Path, prefix: &str, found: &mut Vec<(String, PathBuf)>) -> Re
     Ok(())
 }
 
-/// Whether a TOML file is a scene: rules and tables of blade sections are none. What cannot be read is one, and its run
-/// says what is wrong.
+/// Whether a TOML file is a scene: rules and tables of blade sections are none. What cannot be read is one,
+/// and its run says what is wrong.
 fn is_scene(path: &Path) -> bool {
     let text = regular::read(path, MAX_SCENE_BYTES).ok().and_then(|bytes| String::from_utf8(bytes).ok());
     let Some(text) = text else { return true };
@@ -210,7 +211,8 @@ fn case_digest(case: &Case, path: &Path, scene: Option<&Scene>, program: &str) -
 mod tests {
     use super::*;
 
-    /// Without running them: every row of the shipped file names a toolpath of a shipped scene, and every scene has a row.
+    /// Without running them: every row of the shipped file names a toolpath of a shipped scene, and every
+    /// scene has a row.
     #[test]
     fn the_shipped_figures_of_the_sources_name_their_scenes() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sources");

@@ -10,9 +10,9 @@ struct State {
     free_mib: u64,
 }
 
-/// Does `work` for every number of `claims`, up to `jobs` at a time, as long as their claims (MiB) together are within
-/// `budget_mib`. A claim beyond the budget counts as all of it, and so runs alone. Earlier ones start first where they fit.
-/// Leaves the answers in order.
+/// Does `work` for every number of `claims`, up to `jobs` at a time, as long as their claims (MiB) together
+/// are within `budget_mib`. A claim beyond the budget counts as all of it, and so runs alone. Earlier ones
+/// start first where they fit. Leaves the answers in order.
 pub fn run_all<T: Send>(
     jobs: usize,
     budget_mib: u64,

@@ -30,7 +30,8 @@ const DEFAULT_BUDGET_MIB: u64 = 4096;
 /// Runs the scenes; leaves their results in the plan's order.
 ///
 /// # Errors
-/// [`CliError::NightlyInterrupted`], [`CliError::InTheWay`] for a record that is none, and [`CliError::Output`].
+/// [`CliError::NightlyInterrupted`], [`CliError::InTheWay`] for a record that is none, and
+/// [`CliError::Output`].
 pub fn run(options: &NightlyOptions, plan: &Plan, progress: &Progress) -> Result<Vec<SceneResult>, CliError> {
     let finished = options.out.join(FINISHED);
     fs::create_dir_all(&finished).map_err(CliError::output(&finished))?;
@@ -180,8 +181,8 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The memory at which a scene is stopped, MiB. Its own estimate keeps within `memory_mib`; a scene that exceeds it by a
-/// quarter and what the program itself takes is out of hand.
+/// The memory at which a scene is stopped, MiB. Its own estimate keeps within `memory_mib`; a scene that
+/// exceeds it by a quarter and what the program itself takes is out of hand.
 fn most_mib(planned: &Planned) -> u64 {
     planned.memory_mib + planned.memory_mib / 4 + 64
 }

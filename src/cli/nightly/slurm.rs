@@ -1,7 +1,7 @@
 //! A nightly on Slurm: an array job, a shard each, and a job that merges what they leave.
 //!
-//! A task that is killed and put in the queue again goes on where it was. The merge starts when all tasks have ended,
-//! however they ended, and says which shard is missing.
+//! A task that is killed and put in the queue again goes on where it was. The merge starts when all tasks
+//! have ended, however they ended, and says which shard is missing.
 
 use std::fs;
 use std::io::Read as _;
@@ -11,16 +11,19 @@ use std::process::Command;
 use super::NightlyOptions;
 use crate::error::{CliError, shown};
 
-/// Where the scripts and logs are. Jobs start in the folder that they were submitted from, so paths mean the same.
+/// Where the scripts and logs are. Jobs start in the folder that they were submitted from, so paths mean the
+/// same.
 const FOLDER: &str = "slurm";
 
 /// First lines of the scripts; a file that begins so is ours to replace.
 const HEADER: &str = "#!/bin/sh\n# Millstream wrote this file for Slurm.\n";
 
-/// Writes the scripts into the folder `slurm` of the results and submits them; the text says what was submitted.
+/// Writes the scripts into the folder `slurm` of the results and submits them; the text says what was
+/// submitted.
 ///
 /// # Errors
-/// [`CliError::Nightly`] where sbatch refuses them or is not there, [`CliError::InTheWay`] and [`CliError::Output`].
+/// [`CliError::Nightly`] where sbatch refuses them or is not there, [`CliError::InTheWay`] and
+/// [`CliError::Output`].
 pub fn submit(options: &NightlyOptions, shards: u16, sbatch: &Path) -> Result<String, CliError> {
     let scripts = Scripts { options, shards, program: quoted(&super::program()?)? };
     let folder = options.out.join(FOLDER);

@@ -1,7 +1,7 @@
 //! What of a folder is ours: the list that a run leaves of its files, and the check before the next one.
 //!
-//! The list is millstream.sha256, which `sha256sum -c` reads too. A file that it names is ours as long as it is
-//! unchanged. Whatever else stands where results go is in the way.
+//! The list is millstream.sha256, which `sha256sum -c` reads too. A file that it names is ours as long as it
+//! is unchanged. Whatever else stands where results go is in the way.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -88,8 +88,8 @@ fn in_the_way(path: PathBuf, reason: impl Into<String>) -> CliError {
 /// Refuses what must not be lost; leaves what of `target` is ours.
 ///
 /// # Errors
-/// [`CliError::InTheWay`] for the first thing that no earlier run wrote, or that was changed since, or that this run
-/// reads. [`CliError::Output`] for what cannot be read.
+/// [`CliError::InTheWay`] for the first thing that no earlier run wrote, or that was changed since, or that
+/// this run reads. [`CliError::Output`] for what cannot be read.
 pub(super) fn check(target: &Path, claims: &Claims) -> Result<Vec<Owned>, CliError> {
     let owned = owned(target)?;
     let state = State { target, owned: &owned };

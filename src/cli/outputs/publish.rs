@@ -1,22 +1,25 @@
 //! Puts staged results in their place so that a kill at any instant leaves the old or the new ones, whole.
 //!
-//! Results are many files, and no file system replaces many files at once. It does replace one link at once, and so:
+//! Results are many files, and no file system replaces many files at once. It does replace one link at once,
+//! and so:
 //!
 //! 1. `.millstream/new` holds the new results, synced. The old ones get second names in `.millstream/old`.
-//! 2. The link `.millstream/current` says `old`. One after the other, each old file in the target is replaced by a link
-//!    to `.millstream/current/…`, which leads to the same bytes. Each name that is new gets such a link too; it leads
-//!    nowhere yet.
-//! 3. `current` is replaced by a link that says `new`. In this instant all names lead to the new results, and names that
-//!    are gone lead nowhere.
-//! 4. Each link is replaced by the file that it leads to, links to nowhere are removed, and `.millstream` goes.
+//! 2. The link `.millstream/current` says `old`. One after the other, each old file in the target is replaced
+//!    by a link to `.millstream/current/…`, which leads to the same bytes. Each name that is new gets such a
+//!    link too; it leads nowhere yet.
+//! 3. `current` is replaced by a link that says `new`. In this instant all names lead to the new results, and
+//!    names that are gone lead nowhere.
+//! 4. Each link is replaced by the file that it leads to, links to nowhere are removed, and `.millstream`
+//!    goes.
 //!
-//! A kill leaves `.millstream` behind. The next run sees by `current` which results hold: it undoes step 2 or completes
-//! step 4, both by [`ResultsPlace::settle`], which may be killed and repeated as well. Between the steps everything is synced,
-//! in this order, so that the same is true when the power fails.
+//! A kill leaves `.millstream` behind. The next run sees by `current` which results hold: it undoes step 2 or
+//! completes step 4, both by [`ResultsPlace::settle`], which may be killed and repeated as well. Between the
+//! steps everything is synced, in this order, so that the same is true when the power fails.
 //!
-//! Where the file system knows no links (FAT, Windows), a file `commit` takes the place of `current`. It names the old
-//! files that are to go; once it is there, the new ones are moved over the old ones, and a later run completes that. A
-//! kill in between leaves no report.json (of a nightly, no nightly.json): it goes first and comes last.
+//! Where the file system knows no links (FAT, Windows), a file `commit` takes the place of `current`. It
+//! names the old files that are to go; once it is there, the new ones are moved over the old ones, and a
+//! later run completes that. A kill in between leaves no report.json (of a nightly, no nightly.json): it goes
+//! first and comes last.
 
 use std::fs;
 use std::io::{Error, ErrorKind, Result};
@@ -244,7 +247,8 @@ impl ResultsPlace {
         folders.try_for_each(|folder| if folder.is_dir() { self.disk.sync(&folder) } else { Ok(()) })
     }
 
-    /// Removes the staging folder. First goes what a later run would act by, last what says whose folder it is.
+    /// Removes the staging folder. First goes what a later run would act by, last what says whose folder it
+    /// is.
     fn discard(&self) -> Result<()> {
         for name in [CURRENT, COMMIT, NEXT] {
             self.disk.remove_file(&self.staged(name))?;

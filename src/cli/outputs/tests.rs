@@ -37,8 +37,8 @@ fn fill(target: &Path, text: &str) -> Outputs {
     fill_on(Disk::default(), target, &["zigzag"], text).unwrap()
 }
 
-/// What a reader finds: the names that lead somewhere, and their bytes, without the staging folder and without empty
-/// folders.
+/// What a reader finds: the names that lead somewhere, and their bytes, without the staging folder and
+/// without empty folders.
 fn read(folder: &Path) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     for name in entries(folder).into_iter().filter(|name| name != STAGING) {
@@ -253,8 +253,8 @@ fn kill_publishing(steps: usize, without_links: bool) -> Option<tempfile::TempDi
     outputs.publish().is_err().then_some(home)
 }
 
-/// Kills at every step of publishing. What a reader finds at once, and what the next run makes of it when it is killed at
-/// every step in turn, is the old or the new result, and the same one.
+/// Kills at every step of publishing. What a reader finds at once, and what the next run makes of it when it
+/// is killed at every step in turn, is the old or the new result, and the same one.
 #[cfg(unix)]
 #[test]
 fn a_kill_at_any_step_leaves_the_old_or_the_new_results() {

@@ -141,7 +141,8 @@ impl Maps<'_> {
         })
     }
 
-    /// Writes deviation.png, path.png and deviation.exr, of several patches with their number; a mesh is shown in the plan view.
+    /// Writes deviation.png, path.png and deviation.exr, of several patches with their number; a mesh is
+    /// shown in the plan view.
     fn of_normals(&self, map: &NormalMap, spacing: f64) -> Result<ToolpathPage, CliError> {
         if map.grids.is_empty() {
             let lines = plan_lines(&self.outcome.path);

@@ -76,7 +76,8 @@ fn sampled_times_find_nothing_worse() {
 
 #[test]
 fn sliding_along_a_surface_is_clear() {
-    // Around the inside of a cylinder of 20 mm, tangent all the time: deep by chords of facets and moves only.
+    // Around the inside of a cylinder of 20 mm, tangent all the time: deep by chords of facets and moves
+    // only.
     let (trough, tree) = sheet(30.0, 600, |_, y| 20.0 - (400.0 - y * y).sqrt());
     let trough = Obstacle::new(&trough, &tree);
     let cutter = Cutter::ball(6.0).unwrap();

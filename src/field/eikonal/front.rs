@@ -1,13 +1,14 @@
-//! How fast a front moves through one place of a surface, by direction, and when it comes to a node of a grid from its
-//! neighbours.
+//! How fast a front moves through one place of a surface, by direction, and when it comes to a node of a grid
+//! from its neighbours.
 //!
-//! A front φ = const moves by `speed(b)` mm while φ grows by one, `b` the unit vector across it. In orthonormal
-//! components q of ∇φ that is `|q|² = s²(q)`, with the slowness `s = 1/speed`. For a ball cutter s² is
-//! a quadratic in the curvature of the surface along `b`, but for terms of fourth order in the strip's width: a constant plus a
-//! second and a fourth harmonic of the angle of `b`; what other cutters and limited strips add to that is kept as a table.
+//! A front φ = const moves by `speed(b)` mm while φ grows by one, `b` the unit vector across it. In
+//! orthonormal components q of ∇φ that is `|q|² = s²(q)`, with the slowness `s = 1/speed`. For a ball cutter
+//! s² is a quadratic in the curvature of the surface along `b`, but for terms of fourth order in the strip's
+//! width: a constant plus a second and a fourth harmonic of the angle of `b`; what other cutters and limited
+//! strips add to that is kept as a table.
 
-/// Directions of the table over half a turn (a front and its reverse are equally fast). More follow sudden changes of the
-/// speed closer.
+/// Directions of the table over half a turn (a front and its reverse are equally fast). More follow sudden
+/// changes of the speed closer.
 const DIRECTIONS: usize = 32;
 
 /// What the table adds is left out below this share of s².
@@ -40,13 +41,15 @@ pub struct Front {
     /// Bounds of s².
     least: f64,
     greatest: f64,
-    /// Greatest φ_u and φ_v of any front: φ by which the neighbour along an axis is later at most, over the distance.
+    /// Greatest φ_u and φ_v of any front: φ by which the neighbour along an axis is later at most, over the
+    /// distance.
     pub(super) steepest: [f64; 2],
 }
 
 impl Front {
-    /// From the first fundamental form `(E, F, G)` and the speed (mm for each unit of φ) across fronts with the unit
-    /// normal `du ∂u + dv ∂v`; `None` where the metric is degenerate or a speed is not a positive number.
+    /// From the first fundamental form `(E, F, G)` and the speed (mm for each unit of φ) across fronts with
+    /// the unit normal `du ∂u + dv ∂v`; `None` where the metric is degenerate or a speed is not a positive
+    /// number.
     pub fn new((e, f, g): (f64, f64, f64), mut speed: impl FnMut([f64; 2]) -> f64) -> Option<Self> {
         let determinant = e * g - f * f;
         if !(e > 0.0 && determinant > 1e-24 * e * g && determinant.is_finite()) {
@@ -67,8 +70,8 @@ impl Front {
         Some(Self::of(frame, &slowness))
     }
 
-    /// The same with the convex hull of the polar diagram of slowness: nowhere faster. Such fronts are unique, and have no
-    /// corners of their own.
+    /// The same with the convex hull of the polar diagram of slowness: nowhere faster. Such fronts are
+    /// unique, and have no corners of their own.
     #[must_use]
     pub fn convex(&self) -> Self {
         let slowness = std::array::from_fn(|k| {
@@ -157,8 +160,8 @@ impl Front {
         [(du - self.frame[1] * x2) / self.frame[0], x2]
     }
 
-    /// φ for each mm that a front whose normal has the parameters `[du, dv]` (of any length) moves along it, times the
-    /// length: the arrival of a plane front.
+    /// φ for each mm that a front whose normal has the parameters `[du, dv]` (of any length) moves along it,
+    /// times the length: the arrival of a plane front.
     pub(super) fn plane(&self, across: [f64; 2]) -> f64 {
         let x = self.components(across);
         x[0].hypot(x[1]) * self.square(x).0.max(0.0).sqrt()
@@ -194,9 +197,9 @@ impl Front {
         length * arrival(0.5 * (a + b)).max(arrival(best))
     }
 
-    /// φ at a node from its neighbours at distances `pitch` along u and along v, on the sides `toward` (±1: the front
-    /// moves along or against the parameter), where it has the values `known`. The smallest of the front through both
-    /// and of those along one; infinite when nothing is known.
+    /// φ at a node from its neighbours at distances `pitch` along u and along v, on the sides `toward` (±1:
+    /// the front moves along or against the parameter), where it has the values `known`. The smallest of the
+    /// front through both and of those along one; infinite when nothing is known.
     pub(super) fn arrival(&self, pitch: [f64; 2], toward: [f64; 2], known: [f64; 2]) -> f64 {
         let alone = [0, 1].map(|c| known[c] + pitch[c] * self.steepest[c]);
         let alone = alone[0].min(alone[1]);
@@ -206,8 +209,8 @@ impl Front {
         }
     }
 
-    /// φ of the front through both neighbours; `None` where there is none, or (if `causal`) where its energy comes from
-    /// elsewhere.
+    /// φ of the front through both neighbours; `None` where there is none, or (if `causal`) where its energy
+    /// comes from elsewhere.
     pub(super) fn through_both(
         &self,
         pitch: [f64; 2],

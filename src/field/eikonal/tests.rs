@@ -1,4 +1,5 @@
-//! Closed forms: plane, elliptic speed, cylinder, cone and sphere, from borders, points and curves; signs; cuts.
+//! Closed forms: plane, elliptic speed, cylinder, cone and sphere, from borders, points and curves; signs;
+//! cuts.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -114,7 +115,8 @@ fn elliptic_fronts_are_those_of_the_stretched_plane() {
 /// Speed along the axes as strips have them, from a border: φ follows a closed form by separation.
 #[test]
 fn speeds_that_change_with_place_and_direction_are_of_second_order() {
-    // φ = v + 0.2 sin(2u) (1 + v) prescribed, so that φ = 0 on v = -1 is off; start on the curve φ = 0 instead.
+    // φ = v + 0.2 sin(2u) (1 + v) prescribed, so that φ = 0 on v = -1 is off; start on the curve φ = 0
+    // instead.
     let phi = |u: f64, v: f64| v + 0.25 * (2.0 * u).sin();
     let slope = |u: f64, _: f64| [0.5 * (2.0 * u).cos(), 1.0];
     // Slowness² = (1 + 0.3 cos 2(θ − 0.4)) m(u, v), with m such that φ solves it.
@@ -194,7 +196,8 @@ fn fronts_from_all_borders_meet_in_the_middle() {
     assert!(off < 0.01, "{off}");
 }
 
-/// A slowness so uneven that its diagram has dents (ratio of squares 4) still moves plane fronts at their speed.
+/// A slowness so uneven that its diagram has dents (ratio of squares 4) still moves plane fronts at their
+/// speed.
 #[test]
 fn plane_fronts_keep_their_speed_where_the_diagram_is_dented() {
     let front = |_: f64, _: f64| Front::new((1.0, 0.0, 1.0), |[x, y]| 1.0 / (x * x + 4.0 * y * y).sqrt());
@@ -273,8 +276,9 @@ proptest! {
     }
 }
 
-/// Where the speed changes by much from node to node, and by direction, sweeps may carry φ away without end: they tell that they do
-/// not settle. Convex fronts do, and stay within what the least and the greatest speed allow.
+/// Where the speed changes by much from node to node, and by direction, sweeps may carry φ away without end:
+/// they tell that they do not settle. Convex fronts do, and stay within what the least and the greatest speed
+/// allow.
 #[test]
 fn a_front_through_sudden_changes_of_speed_settles_where_it_is_convex() {
     let border = [vec![[-1.0, -1.0], [1.0, -1.0]]];

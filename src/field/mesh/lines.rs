@@ -1,5 +1,5 @@
-//! Line fields: a feed direction and its opposite are the same pass. At each vertex a line is the
-//! complex number exp(2iθ) in the vertex's tangent frame, which both have in common.
+//! Line fields: a feed direction and its opposite are the same pass. At each vertex a line is the complex
+//! number exp(2iθ) in the vertex's tangent frame, which both have in common.
 //!
 //! Enters: wanted lines with weights, lines that must hold. Leaves: the smooth field that minimises
 //!
@@ -8,10 +8,11 @@
 //! ```
 //!
 //! neighbours compared by parallel transport (Knöppel, Crane, Pinkall and Schröder, "Globally optimal
-//! direction fields", 2013); oriented like arrows as far as that is possible, and the singular points
-//! at which it is not.
+//! direction fields", 2013); oriented like arrows as far as that is possible, and the singular points at
+//! which it is not.
 //!
-//! A singular point of index 1 costs more than two of index ½. So smoothing parts a centre or a source into two.
+//! A singular point of index 1 costs more than two of index ½. So smoothing parts a centre or a source into
+//! two.
 
 use faer::c64;
 
@@ -25,7 +26,8 @@ use geometry::{Point3, Vector3};
 /// have less, or negative ones, with which the field may turn more sharply between them than anywhere.
 const LEAST_COTANGENT: f64 = 0.05;
 
-/// Blended lines cancel where their sum is less than this share of the sum of their weights: what rounding leaves.
+/// Blended lines cancel where their sum is less than this share of the sum of their weights: what rounding
+/// leaves.
 const CANCELLED: f64 = 1e-9;
 
 /// What is wanted at one vertex: a tangent of any length > 0 and how much it matters (≥ 0). Nothing
@@ -74,8 +76,8 @@ fn turn(mesh: &FieldMesh, from: usize, to: usize) -> f64 {
     carried.dot(&e2).atan2(carried.dot(&e1))
 }
 
-/// The mean of lines in the tangent plane of a frame, as the mean of their doubled angles by weights ≥ 0: its direction,
-/// and the length of the sum. `None` where the lines cancel.
+/// The mean of lines in the tangent plane of a frame, as the mean of their doubled angles by weights ≥ 0: its
+/// direction, and the length of the sum. `None` where the lines cancel.
 pub fn blend_lines(
     [e1, e2]: &[Vector3; 2],
     lines: impl IntoIterator<Item = (Vector3, f64)>,
@@ -95,7 +97,8 @@ pub fn blend_lines(
     (length > CANCELLED * total).then(|| (e1 * cos + e2 * sin, length))
 }
 
-/// Blends wanted lines by their weights times the given ones ([`blend_lines`]); opposite wishes of equal weight cancel.
+/// Blends wanted lines by their weights times the given ones ([`blend_lines`]); opposite wishes of equal
+/// weight cancel.
 ///
 /// # Errors
 /// [`MeshFieldError::Invalid`] when a list has not one entry for each vertex.
@@ -269,7 +272,8 @@ pub fn singular_points(mesh: &FieldMesh, lines: &[Line], merge: f64) -> Vec<Sing
     merge_singular_points(&found, merge)
 }
 
-/// Counts singular points nearer than `merge` (mm) to the first one of them as one; they vanish where their turns cancel.
+/// Counts singular points nearer than `merge` (mm) to the first one of them as one; they vanish where their
+/// turns cancel.
 pub fn merge_singular_points(found: &[SingularPoint], merge: f64) -> Vec<SingularPoint> {
     let mut merged: Vec<SingularPoint> = Vec::new();
     let mut left = found.to_vec();

@@ -95,8 +95,8 @@ pub fn vertex_gradients(mesh: &FieldMesh, values: &[f64]) -> Vec<Vector3> {
     gradients
 }
 
-/// How [`vertex_gradients`] follow from the values: for each vertex the vertices that count, each with what its
-/// value is multiplied by.
+/// How [`vertex_gradients`] follow from the values: for each vertex the vertices that count, each with what
+/// its value is multiplied by.
 pub fn gradient_terms(mesh: &FieldMesh) -> Vec<Vec<(u32, Vector3)>> {
     let mut terms = vec![Vec::new(); mesh.points().len()];
     parallel::for_each_chunk(&mut terms, CHUNK, |chunk, out| {

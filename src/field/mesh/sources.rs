@@ -11,7 +11,8 @@ const CUSP: f64 = 2.6;
 /// Tangents shorter than this, of unit vectors, have no direction.
 const NO_DIRECTION: f64 = 1e-9;
 
-/// Ground that rises by less than this has no slope, rad: what rounding and fits leave of level ground would have one.
+/// Ground that rises by less than this has no slope, rad: what rounding and fits leave of level ground would
+/// have one.
 const LEVEL: f64 = 1e-4;
 
 /// Along a curve or square to it.
@@ -39,8 +40,8 @@ pub fn fixed_angle(mesh: &FieldMesh, angle: f64) -> Vec<Wanted> {
     mesh.normals().iter().map(|n| across.cross(n).try_normalize(NO_DIRECTION).map(|t| (t, 1.0))).collect()
 }
 
-/// The direction up the slope, or level along it, for a surface with this unit normal, and how much it matters: the sine
-/// of the slope. `None` on level ground.
+/// The direction up the slope, or level along it, for a surface with this unit normal, and how much it
+/// matters: the sine of the slope. `None` on level ground.
 pub fn slope_at(normal: &Vector3, up: bool) -> Option<(Vector3, f64)> {
     let level = Vector3::z().cross(normal);
     let steepness = level.norm();
@@ -53,8 +54,8 @@ pub fn slope(mesh: &FieldMesh, up: bool) -> Vec<Wanted> {
     mesh.normals().iter().map(|n| slope_at(n, up)).collect()
 }
 
-/// Along or across the borders, at corners along their bisector, which tells in which sense passes turn there. Where
-/// passes reach the border they follow it; inside, the field is as smooth as the borders allow.
+/// Along or across the borders, at corners along their bisector, which tells in which sense passes turn
+/// there. Where passes reach the border they follow it; inside, the field is as smooth as the borders allow.
 pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
     let mut wanted = vec![None; mesh.points().len()];
     for ring in mesh.loops() {
@@ -77,8 +78,8 @@ pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
     wanted
 }
 
-/// Along or across guide curves, each a polyline of the plan view, at the vertices within `reach` (mm, in the plan view)
-/// of it, or of the vertex nearest to it; the nearest stretch counts.
+/// Along or across guide curves, each a polyline of the plan view, at the vertices within `reach` (mm, in the
+/// plan view) of it, or of the vertex nearest to it; the nearest stretch counts.
 pub fn guides(mesh: &FieldMesh, curves: &[Vec<Point2>], reach: f64, sense: Sense) -> Vec<Wanted> {
     let segments: Vec<[Point2; 2]> =
         curves.iter().flat_map(|c| c.windows(2).map(|w| [w[0], w[1]])).filter(|[a, b]| a != b).collect();

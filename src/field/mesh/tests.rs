@@ -92,7 +92,8 @@ fn difference(mesh: &FieldMesh, values: &[f64], exact: impl Fn(&Point3) -> f64) 
     (off.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
-/// A plate in two halves and a fin on the edge between them; and a band with half a turn, which is cut where its sides meet the wrong way.
+/// A plate in two halves and a fin on the edge between them; and a band with half a turn, which is cut where
+/// its sides meet the wrong way.
 #[test]
 fn parted_surfaces_have_borders_where_more_than_two_triangles_meet() {
     let points: Vec<Point3> = [

@@ -1,14 +1,16 @@
 //! Streamlines of directions at the vertices of a mesh, by the classical Runge–Kutta method of fourth order.
 //!
-//! Enters: lines at the vertices, for which d and −d are the same. Within a triangle the line is the mean of those at its corners,
-//! in its plane. A step leads over the triangles that it meets, straight on as if they lay in one plane. Errors fall with the
-//! square of the edges' length and with the fourth power of the step; mm.
+//! Enters: lines at the vertices, for which d and −d are the same. Within a triangle the line is the mean of
+//! those at its corners, in its plane. A step leads over the triangles that it meets, straight on as if they
+//! lay in one plane. Errors fall with the square of the edges' length and with the fourth power of the step;
+//! mm.
 
 use super::surface::turned;
 use super::{FieldMesh, MeshPoint};
 use geometry::{Point3, Vector3};
 
-/// A step that would leave the mesh is halved until it is this share of a whole one; then it leads straight to the border.
+/// A step that would leave the mesh is halved until it is this share of a whole one; then it leads straight
+/// to the border.
 const LEAST_STEP: f64 = 1e-3;
 
 /// A line is closed where it comes back within this share of a step.
@@ -58,8 +60,8 @@ impl<'a> MeshTracer<'a> {
         Ok(Self { mesh, lines })
     }
 
-    /// The streamline through a point, in both senses, in steps of `step` mm: till it comes to a border, to a place without a line
-    /// or back to where it began, or is `longest` mm long.
+    /// The streamline through a point, in both senses, in steps of `step` mm: till it comes to a border, to a
+    /// place without a line or back to where it began, or is `longest` mm long.
     pub fn through(&self, seed: MeshPoint, step: f64, longest: f64) -> Streamline {
         let corners = self.mesh.triangles()[seed.triangle as usize];
         let toward =

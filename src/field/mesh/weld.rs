@@ -126,8 +126,8 @@ pub fn weld(points: &[Point3], triangles: &[[u32; 3]], distance: f64) -> (Vec<Po
     compact(points, sewn)
 }
 
-/// The same triangles, joined only where an edge has two of them, one on each side: where more meet, or both lie on one side, each
-/// gets vertices of its own there, and the surface has borders.
+/// The same triangles, joined only where an edge has two of them, one on each side: where more meet, or both
+/// lie on one side, each gets vertices of its own there, and the surface has borders.
 pub fn parted(points: &[Point3], triangles: &[[u32; 3]]) -> (Vec<Point3>, Vec<[u32; 3]>) {
     let corner = |t: usize, k: usize| (3 * t + k % 3) as u32;
     // Both corners of a side by its vertices, the lesser one first, and whether it runs that way.
@@ -171,8 +171,9 @@ pub(super) fn root(head: &[u32], mut v: u32) -> u32 {
     v
 }
 
-/// Cuts a polygon, nearly convex, into triangles: next always the ear that leaves both itself and the rest in the best
-/// shape. An ear over a whole side would leave the vertices on that side as a sliver, which may even face down.
+/// Cuts a polygon, nearly convex, into triangles: next always the ear that leaves both itself and the rest in
+/// the best shape. An ear over a whole side would leave the vertices on that side as a sliver, which may even
+/// face down.
 fn cut_ears(points: &[Point3], mut polygon: Vec<u32>, out: &mut Vec<[u32; 3]>) {
     let p = |v: u32| points[v as usize];
     let doubled_area = |polygon: &[u32]| -> Vector3 {

@@ -393,7 +393,8 @@ fn orient(
     Ok(flipped)
 }
 
-/// Turns over each open piece that faces down or is inside out; leaves closed ones. Returns how many triangles were turned.
+/// Turns over each open piece that faces down or is inside out; leaves closed ones. Returns how many
+/// triangles were turned.
 fn face_pieces(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> usize {
     let mut seen = vec![false; soup.faces.len()];
     let mut turned = 0;

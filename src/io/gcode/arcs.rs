@@ -1,9 +1,10 @@
 //! Moves of a program made into arcs (G2, G3) in the plan view, also on a slope.
 //!
-//! Enters: places in the last decimals that a program has, one feed. Leaves: the longest arc from the first of them that stays
-//! within a tolerance of the moves, is as long as they are, and can be run at their feed. An arc ends on a place; all it passes lie
-//! near it, and so do the moves between them. What is compared is what controls make of the words: the circle about the rounded
-//! middle through the first place, drawn to the last one; mm, rad.
+//! Enters: places in the last decimals that a program has, one feed. Leaves: the longest arc from the first
+//! of them that stays within a tolerance of the moves, is as long as they are, and can be run at their feed.
+//! An arc ends on a place; all it passes lie near it, and so do the moves between them. What is compared is
+//! what controls make of the words: the circle about the rounded middle through the first place, drawn to the
+//! last one; mm, rad.
 
 use std::f64::consts::PI;
 
@@ -22,8 +23,8 @@ const RADII: [f64; 2] = [0.02, 2000.0];
 /// An arc is as long as its moves but for this share: times hold.
 const AS_LONG: f64 = 0.01;
 
-/// Start and end of an arc may differ in their distance from the middle by so much, mm: controls refuse more than some
-/// micrometres, and rounding makes less.
+/// Start and end of an arc may differ in their distance from the middle by so much, mm: controls refuse more
+/// than some micrometres, and rounding makes less.
 const ROUNDED: f64 = 2.0e-4;
 
 /// An arc in the words of a program.
@@ -61,7 +62,8 @@ pub(super) fn longest(places: &[Point3], feed: f64, rule: &ArcRule) -> Option<Ar
     best
 }
 
-/// The arc about the circle through the first, the middle and the last of some places, if it is near all moves.
+/// The arc about the circle through the first, the middle and the last of some places, if it is near all
+/// moves.
 fn through(places: &[Point3], least: f64, tolerance: f64) -> Option<Arc> {
     let last = places.len() - 1;
     let [a, b, c] = [0, last / 2, last].map(|k| places[k].xy());
@@ -141,7 +143,8 @@ mod tests {
         super::longest(places, 600.0, &ArcRule { tolerance, acceleration: 1000.0 })
     }
 
-    /// Chords of a circle become arcs of less than half a turn, where their sagitta allows it, level and sloping.
+    /// Chords of a circle become arcs of less than half a turn, where their sagitta allows it, level and
+    /// sloping.
     #[test]
     fn chords_of_a_circle_are_arcs() {
         for (radius, drop) in [(5.0, 0.0), (2.4, 0.01), (80.0, 0.0)] {

@@ -1,21 +1,23 @@
 //! Programs for machines with two rotary axes, in two styles.
 //!
-//! Tool centre point control ([`Style::Tcp`], [`TCP_WORDS`] or those of another control): X Y Z are the tip in the workpiece, whose frame turns with
-//! the table; the control moves the linear axes so that the tip runs straight. Feeds are those of the tip (G94);
-//! where only rotary axes move, F is that of the one that turns farthest, degrees/min.
+//! Tool centre point control ([`Style::Tcp`], [`TCP_WORDS`] or those of another control): X Y Z are the tip
+//! in the workpiece, whose frame turns with the table; the control moves the linear axes so that the tip runs
+//! straight. Feeds are those of the tip (G94); where only rotary axes move, F is that of the one that turns
+//! farthest, degrees/min.
 //!
-//! All joints ([`Style::Full`]): X Y Z are the linear axes in the work offset at the workpiece's zero (with the rotary
-//! axes at zero they are the tip's), for controls that move five axes evenly and know nothing of the tip. Moves are
-//! divided so that the tip stays on its line within the chord tolerance. Feeds are inverse times (G93, 1/min), since
-//! no other feed has a meaning for lines and turns together.
+//! All joints ([`Style::Full`]): X Y Z are the linear axes in the work offset at the workpiece's zero (with
+//! the rotary axes at zero they are the tip's), for controls that move five axes evenly and know nothing of
+//! the tip. Moves are divided so that the tip stays on its line within the chord tolerance. Feeds are inverse
+//! times (G93, 1/min), since no other feed has a meaning for lines and turns together.
 //!
 //! In both styles a feed is lowered where a joint would exceed its rate.
 //!
 //! A rapid move that turns the tool is a G1 at the rapid rate: with G0 each axis would go its own way.
 //!
-//! Begin and end. The spindle rises along the machine's z to the end of its travel (G53; its zero where no travel is known), the rotary axes turn up there, X and Y move, and
-//! the tip comes down along the machine's z over the start of the path, from above all of the path. With [`Style::Tcp`] the
-//! linear axes stand there before the control begins to keep the tip, so that only Z is left to move. The same way round before
+//! Begin and end. The spindle rises along the machine's z to the end of its travel (G53; its zero where no
+//! travel is known), the rotary axes turn up there, X and Y move, and the tip comes down along the machine's
+//! z over the start of the path, from above all of the path. With [`Style::Tcp`] the linear axes stand there
+//! before the control begins to keep the tip, so that only Z is left to move. The same way round before
 //! rewinds, and up again at the end.
 
 use super::super::program_text::{ProgramHeader, describe, number, number_below, number_to};
@@ -62,7 +64,8 @@ impl Style {
         [Self::Tcp, Self::Full].into_iter().find(|style| style.name() == word)
     }
 
-    /// How joints have to follow a path that is written this way: within `chord`, mm, for a cutter of `length`, mm.
+    /// How joints have to follow a path that is written this way: within `chord`, mm, for a cutter of
+    /// `length`, mm.
     pub fn following(self, chord: f64, length: f64) -> Following {
         match self {
             Self::Tcp => Following::with_tip_kept(chord, length),

@@ -31,8 +31,8 @@ fn halves(control: &[Weighted]) -> [Vec<Weighted>; 2] {
     [left, right]
 }
 
-/// How far a Bézier curve of positive weights may lie off its chord, mm: no farther than the farthest control point, less the share that
-/// the ends have in every place of it.
+/// How far a Bézier curve of positive weights may lie off its chord, mm: no farther than the farthest control
+/// point, less the share that the ends have in every place of it.
 fn off_chord(control: &[Weighted]) -> f64 {
     let [Some(first), Some(last)] = [control.first(), control.last()] else { return 0.0 };
     let ends = [place(first), place(last)];
@@ -62,7 +62,8 @@ impl Chords {
         halve(&control, tolerance, MAX_HALVINGS, self);
     }
 
-    /// Appends an arc of an ellipse, without its first point: centre, two conjugate half axes, from one angle to another (rad).
+    /// Appends an arc of an ellipse, without its first point: centre, two conjugate half axes, from one angle
+    /// to another (rad).
     pub fn ellipse(
         &mut self,
         centre: Point2,
@@ -131,8 +132,9 @@ impl Spline {
         bad.then(|| "a control point is not finite or a weight is not positive".into())
     }
 
-    /// A control point of the Bézier curve over the span that begins at knot `span`: the blossom of the span's end, `of_end` times, and of
-    /// its beginning, by de Boor's recursion. Only for splines without fault.
+    /// A control point of the Bézier curve over the span that begins at knot `span`: the blossom of the
+    /// span's end, `of_end` times, and of its beginning, by de Boor's recursion. Only for splines without
+    /// fault.
     fn blossom(&self, span: usize, of_end: usize) -> Weighted {
         let p = self.degree;
         let mut d: Vec<Weighted> = (span - p..=span)

@@ -1,9 +1,9 @@
 //! DXF, the text form: pairs of a group code and a value (Autodesk DXF reference, AC1009 to AC1032).
 //!
-//! Read are LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE and POLYLINE with bulges, and SPLINE by control points,
-//! of model space, in the plane z = const seen from above or below. Other entities are named in a note, and so are those that are
-//! left out because they are invisible or on a layer that is frozen or off; inserted blocks are refused, since geometry may hide
-//! in them, and so are entities whose z varies.
+//! Read are LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE and POLYLINE with bulges, and SPLINE by control points, of
+//! model space, in the plane z = const seen from above or below. Other entities are named in a note, and so
+//! are those that are left out because they are invisible or on a layer that is frozen or off; inserted
+//! blocks are refused, since geometry may hide in them, and so are entities whose z varies.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

@@ -2,8 +2,8 @@
 //!
 //! Enters: a drawing of one of [`OUTLINE_FORMATS`]. Leaves: closed polylines in mm, y up, and the entity that
 //! each came from. Curves are flattened within a chord tolerance; open chains are joined where ends lie
-//! within [`JOIN_TOLERANCE`]. How far the polylines lie off the curves by both is bounded. Nothing is left out in silence: what cannot be an outline is refused with
-//! file, line and place, or named in a note.
+//! within [`JOIN_TOLERANCE`]. How far the polylines lie off the curves by both is bounded. Nothing is left
+//! out in silence: what cannot be an outline is refused with file, line and place, or named in a note.
 
 mod chain;
 mod curve;
@@ -26,7 +26,8 @@ pub const JOIN_TOLERANCE: f64 = 0.01;
 /// Largest drawing that is read, bytes.
 pub const MAX_BYTES: u64 = 64 << 20;
 
-/// The formats of drawings, in the order in which messages list them: a new one is a file of its own and a line here.
+/// The formats of drawings, in the order in which messages list them: a new one is a file of its own and a
+/// line here.
 pub const OUTLINE_FORMATS: [OutlineFormat; 2] = [dxf::FORMAT, svg::FORMAT];
 
 /// Extensions of the files of all formats, lower case.

@@ -1,10 +1,11 @@
 //! SVG: path, rect, circle, ellipse, polygon, polyline and line, with their transforms (W3C SVG 1.1, 2).
 //!
-//! Lengths in mm come from `width`, `height` and `viewBox`; without units 96 make an inch, as CSS has it.
-//! y, which runs down in SVG, is turned up, with the lower edge of the page at 0. What is hidden, by any of the ways that a
-//! drawing has for that, and what is not drawn in place (`defs`, symbols) is left out, with notes. Refused is what would change
-//! the outlines and is not followed: clips, masks, filters, `use`, animations, shapes for some readers only, and style sheets
-//! that show, hide, place or size shapes. Sheets of colours and pens are passed over; texts and images are named.
+//! Lengths in mm come from `width`, `height` and `viewBox`; without units 96 make an inch, as CSS has it. y,
+//! which runs down in SVG, is turned up, with the lower edge of the page at 0. What is hidden, by any of the
+//! ways that a drawing has for that, and what is not drawn in place (`defs`, symbols) is left out, with
+//! notes. Refused is what would change the outlines and is not followed: clips, masks, filters, `use`,
+//! animations, shapes for some readers only, and style sheets that show, hide, place or size shapes. Sheets
+//! of colours and pens are passed over; texts and images are named.
 
 mod page;
 mod style;
@@ -173,7 +174,8 @@ fn parse(
 
 impl Reader<'_> {
     fn root(&mut self, root: &Node<'_, '_>, map: Map, options: &OutlineOptions) -> Result<(), OutlineError> {
-        // A page is placed by what shows it. Its size does not count where it is a share of that, or the scene has the unit.
+        // A page is placed by what shows it. Its size does not count where it is a share of that, or the
+        // scene has the unit.
         check_style(root, |property, value| {
             let sizes = is_any(property, &["width", "height"]);
             is_any(property, &["x", "y"])
@@ -270,7 +272,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Of a <switch>, the first element that is for all readers is drawn. One before it that is for some readers only is refused.
+    /// Of a <switch>, the first element that is for all readers is drawn. One before it that is for some
+    /// readers only is refused.
     fn first_that_applies(&mut self, node: &Node<'_, '_>, place: Place<'_>) -> Result<(), OutlineError> {
         let is_drawn =
             |n: &Node<'_, '_>| !["style", "defs", "title", "desc", "metadata"].contains(&n.tag_name().name());

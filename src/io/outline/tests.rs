@@ -335,7 +335,8 @@ fn outlines_that_are_not_level_are_refused_or_told() {
     assert!(notes.join("").contains("from z -5 to 2"), "{notes:?}");
 }
 
-/// The bound of an outline holds what its chords are off the curves, in mm whatever the unit, and the gaps that were closed.
+/// The bound of an outline holds what its chords are off the curves, in mm whatever the unit, and the gaps
+/// that were closed.
 #[test]
 fn outlines_have_a_bound_of_what_they_are_off_the_drawing() {
     let of = |outlines: Result<Outlines, OutlineError>| outlines.unwrap().off_curves;

@@ -5,7 +5,8 @@ use serde::Serialize;
 
 use super::SLACK;
 
-/// A plan that does not hold the target is in vain unless it takes this share of what the best one leaves above it.
+/// A plan that does not hold the target is in vain unless it takes this share of what the best one leaves
+/// above it.
 const LEAST_GAIN: f64 = 0.1;
 
 /// A plan that takes this share of it gains much: a few more of its kind take all that can be seen.
@@ -16,10 +17,12 @@ const MUCH: f64 = 0.5;
 pub(crate) struct CorrectionRound {
     /// The highest ridge, mm.
     pub highest_mm: f64,
-    /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that is a ridge.
+    /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that
+    /// is a ridge.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_mm: Option<f64>,
-    /// Bound of the error of the higher one of both; `None` where it is a border that was looked at in places only.
+    /// Bound of the error of the higher one of both; `None` where it is a border that was looked at in places
+    /// only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_bound_mm: Option<f64>,
     /// Half of the ridge length is lower, mm; `None` where cells are too coarse for it.
@@ -35,8 +38,8 @@ pub(crate) struct CorrectionRound {
     /// How much nearer than asked the tool comes to anything between passes, mm; `None` where it keeps clear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub too_near_between_mm: Option<f64>,
-    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them. A plan that differs from
-    /// the best one before by the ends of its passes only has the figures of that one.
+    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them. A plan
+    /// that differs from the best one before by the ends of its passes only has the figures of that one.
     pub measured: bool,
 }
 
@@ -78,15 +81,15 @@ impl CorrectionRound {
                 || self.over_target_fraction.is_some_and(|over| over <= 1.0 - goal.rule.share))
     }
 
-    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead, as it is
-    /// when all is measured.
+    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined
+    /// instead, as it is when all is measured.
     pub fn margin(&self, target: f64) -> f64 {
         let bound = self.error_bound_mm.filter(|bound| self.measured && *bound <= SLACK * target);
         bound.unwrap_or(0.0)
     }
 
-    /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what holds the target,
-    /// then what is shorter; where neither holds it, the one with the lower ridge.
+    /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what
+    /// holds the target, then what is shorter; where neither holds it, the one with the lower ridge.
     pub(super) fn is_better(&self, other: &Self, goal: &Goal) -> bool {
         let clear = [self, other].map(|round| round.too_near_between_mm.is_none());
         if clear[0] != clear[1] {
@@ -151,7 +154,8 @@ mod tests {
         assert!(better(round(1.2, 20.0), colliding(round(0.8, 10.0))));
         assert!(!better(colliding(round(0.8, 10.0)), round(1.2, 20.0)));
         assert!(better(colliding(round(0.8, 9.0)), colliding(round(0.7, 10.0))));
-        // A tenth of what stands above the target is worth another plan of its kind; less is kept, but no reason to go on.
+        // A tenth of what stands above the target is worth another plan of its kind; less is kept, but no
+        // reason to go on.
         let gain = |a: CorrectionRound, b: CorrectionRound| a.gain_over(&b, &strict);
         assert_eq!(gain(round(1.2, 10.0), round(1.2, 10.0)), Gain::None);
         assert_eq!(gain(round(1.199, 10.0), round(1.2, 10.0)), Gain::Little);

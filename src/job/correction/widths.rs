@@ -1,5 +1,5 @@
-//! How much narrower or wider than by calculation passes are planned, where their chords are shorter, and which places get
-//! passes of their own.
+//! How much narrower or wider than by calculation passes are planned, where their chords are shorter, and
+//! which places get passes of their own.
 
 use geometry::{Point3, Vector3};
 use motion::ROUNDING;
@@ -107,9 +107,10 @@ impl Widths {
         Self { touch_up, ..self.clone() }
     }
 
-    /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
-    /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
-    /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
+    /// Narrower where ridges and borders stand above the target, so that they come to the middle of the
+    /// slack: height goes with the square of width. A place that was narrowed already and did not give way
+    /// enough is narrowed by twice as much: there passes may lie nearer than they have to, or less than all
+    /// of the height goes with their width.
     pub fn narrowed(&self, places: &[HighPlace]) -> Self {
         if places.is_empty() {
             return self.clone();

@@ -1,8 +1,9 @@
-//! Rapid moves on controls that may lead each axis at its own rate: what is assumed of them, and whether a bent way would meet stock.
+//! Rapid moves on controls that may lead each axis at its own rate: what is assumed of them, and whether a
+//! bent way would meet stock.
 //!
-//! Such a control starts all axes together, and each stops where it arrives. With one rate for all of them the way goes at 45
-//! degrees first. That way is held against the stock as the straight one is. Rates that differ bend it otherwise, which a note
-//! leaves to the user.
+//! Such a control starts all axes together, and each stops where it arrives. With one rate for all of them
+//! the way goes at 45 degrees first. That way is held against the stock as the straight one is. Rates that
+//! differ bend it otherwise, which a note leaves to the user.
 
 use metrology::View;
 use motion::{Cutters, Move, MoveKind, Toolpath};
@@ -16,7 +17,8 @@ use crate::run::Run;
 /// Travels that differ by less, mm, end together, and shorter ones are none.
 const SAME_TRAVEL: f64 = 1e-6;
 
-/// The rapid moves of a program that may run on a bent way and come as low as stock stands; none on a control that leads them straight.
+/// The rapid moves of a program that may run on a bent way and come as low as stock stands; none on a control
+/// that leads them straight.
 fn bending(run: &Run<'_>) -> Vec<usize> {
     if run.request.foreign().is_none_or(|read| read.straight_rapids.is_none()) {
         return Vec::new();

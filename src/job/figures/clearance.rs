@@ -1,7 +1,9 @@
-//! How near the tool comes to what it must not touch: shank and holder to the part, to fixtures and to the stock that stands
-//! when they pass; the cutter to fixtures, and on rapid moves to the part; the bodies of the machine ([`bodies`]).
+//! How near the tool comes to what it must not touch: shank and holder to the part, to fixtures and to the
+//! stock that stands when they pass; the cutter to fixtures, and on rapid moves to the part; the bodies of
+//! the machine ([`bodies`]).
 //!
-//! The finished path is looked at, whatever its planner thought of it. How deep a fed cutter cuts into the part, gouges tell.
+//! The finished path is looked at, whatever its planner thought of it. How deep a fed cutter cuts into the
+//! part, gouges tell.
 
 use collision::{LeastClearance, Obstacle};
 use cutter::{Cutter, Solid};
@@ -54,7 +56,8 @@ pub struct PairClearance {
     pub tool: String,
     /// What it must not touch.
     pub other: String,
-    /// The least signed distance; below zero they collide, at least so deep. Null where nothing is near enough to count.
+    /// The least signed distance; below zero they collide, at least so deep. Null where nothing is near
+    /// enough to count.
     pub clearance_mm: Option<f64>,
     /// It is less than that by no more than this; null where that is open.
     pub error_bound_mm: Option<f64>,

@@ -1,4 +1,5 @@
-//! How the tool of a program from elsewhere enters stock, and how high it cuts: what a planner of ours would see to itself.
+//! How the tool of a program from elsewhere enters stock, and how high it cuts: what a planner of ours would
+//! see to itself.
 
 use metrology::View;
 use motion::MoveKind;
@@ -11,8 +12,8 @@ use crate::JobError;
 use crate::run::{Finding, Run};
 use crate::tool::ToolMoves;
 
-/// First and last cut of each tool, plunges without an entry, and cuts above the flutes; nothing of paths that were planned here.
-/// Stock is met up to `bound` mm higher than cells or voxels show.
+/// First and last cut of each tool, plunges without an entry, and cuts above the flutes; nothing of paths
+/// that were planned here. Stock is met up to `bound` mm higher than cells or voxels show.
 pub(super) fn of(
     run: &Run<'_>,
     moves: &[MoveRemoval],

@@ -34,8 +34,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     Ok(Finding { claims, ..Finding::default() })
 }
 
-/// No sane program feeds slower than this, mm/min: the lowest of the scene's feeds and of what the machine creeps at around
-/// corners, reduced as far as load reduces any.
+/// No sane program feeds slower than this, mm/min: the lowest of the scene's feeds and of what the machine
+/// creeps at around corners, reduced as far as load reduces any.
 fn least(cutting: &CuttingData, machine: &Machine) -> f64 {
     LEAST_SHARE * cutting.feed_rate.min(cutting.plunge_rate).min(machine.creep_feed())
 }
@@ -84,7 +84,8 @@ fn no_faster(
     feed(limit, rounded(fastest, limit), text)
 }
 
-/// That a program from elsewhere, whose highest feed, mm/min, and its place are given, feeds no faster than the machine goes at rapid.
+/// That a program from elsewhere, whose highest feed, mm/min, and its place are given, feeds no faster than
+/// the machine goes at rapid.
 fn no_faster_than_rapids(highest: Option<(f64, String)>, limit: f64) -> Claim {
     let Some((fastest, place)) = highest else { return feed(limit, 0.0, "no move has a feed".into()) };
     let text = format!(
@@ -93,7 +94,8 @@ fn no_faster_than_rapids(highest: Option<(f64, String)>, limit: f64) -> Claim {
     Claim { gravity: Gravity::Finish, ..feed(limit, rounded(fastest, limit), text) }
 }
 
-/// That moves between passes, those on the surface aside, go down along the tool axis no faster than the plunge rate.
+/// That moves between passes, those on the surface aside, go down along the tool axis no faster than the
+/// plunge rate.
 fn down_no_faster(path: &Toolpath, limit: f64, line: &dyn Fn(usize) -> String) -> Claim {
     let down = |(k, (a, b, m)): (usize, (geometry::Point3, geometry::Point3, &Move))| {
         let way = b - a;

@@ -16,12 +16,13 @@ use crate::run::{Finding, Run};
 pub struct SingularPointFigures {
     /// Where.
     pub at_mm: [f64; 3],
-    /// Turns of the direction on a way around it: 0.5 for the end of a fold, 1 for a centre, -0.5 for a three-way
-    /// junction, -1 for a saddle.
+    /// Turns of the direction on a way around it: 0.5 for the end of a fold, 1 for a centre, -0.5 for a
+    /// three-way junction, -1 for a saddle.
     pub index: f64,
 }
 
-/// Planned intervals over the allowed ones, at even distances along all passes; at each place of the farther neighbour.
+/// Planned intervals over the allowed ones, at even distances along all passes; at each place of the farther
+/// neighbour.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IntervalFigures {
     /// 5 % are narrower.
@@ -37,15 +38,16 @@ pub struct IntervalFigures {
 /// What a streamline path was planned by. Predictions of the planner; nothing of it is measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldFigures {
-    /// What the functions are whose levels are the passes, each once: a stream function that was searched or fitted, or a front
-    /// from a border where its passes are shorter.
+    /// What the functions are whose levels are the passes, each once: a stream function that was searched or
+    /// fitted, or a front from a border where its passes are shorter.
     pub planned_as: Vec<String>,
     /// Number of singular points.
     pub singular_point_count: usize,
     /// The first of them, 100 at most.
     pub singular_points: Vec<SingularPointFigures>,
-    /// The angle between passes and the feed directions asked for, degrees: root mean square over the length of all passes; over the
-    /// rows of a table; over the length of guides and borders. Absent where none were asked for, as the three that follow.
+    /// The angle between passes and the feed directions asked for, degrees: root mean square over the length
+    /// of all passes; over the rows of a table; over the length of guides and borders. Absent where none were
+    /// asked for, as the three that follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction_error_rms_deg: Option<f64>,
     /// The greatest, degrees.
@@ -66,7 +68,8 @@ pub struct FieldFigures {
 pub const MOST_SINGULAR_POINTS: usize = 100;
 
 impl FieldFigures {
-    /// Of a planned field and the functions that were kept of it; those fitted to directions over charts are not.
+    /// Of a planned field and the functions that were kept of it; those fitted to directions over charts are
+    /// not.
     pub fn new(field: &PlannedField, functions: &[Levelled]) -> Self {
         let mut planned_as: Vec<String> = functions.iter().map(|f| f.planned_as.to_string()).collect();
         planned_as.sort();

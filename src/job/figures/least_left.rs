@@ -1,4 +1,5 @@
-//! What the cutter leaves at the highest place wherever it stands: the reason where no path can hold the limit.
+//! What the cutter leaves at the highest place wherever it stands: the reason where no path can hold the
+//! limit.
 
 use serde::Serialize;
 
@@ -29,8 +30,8 @@ pub(crate) struct LeastLeftFigures {
 /// Places of the part's plan along x and along y that are looked at beside the highest ones.
 const PLACES: usize = 12;
 
-/// From so many of them, those that leave most of all places around them, so many steps lead uphill; one that does not is tried again
-/// half as long.
+/// From so many of them, those that leave most of all places around them, so many steps lead uphill; one that
+/// does not is tried again half as long.
 const CLIMBS: usize = 8;
 const STEPS: usize = 12;
 
@@ -66,9 +67,9 @@ impl LeastLeftFigures {
         Self::at_or_elsewhere(session, cutter, &violated, monitor)
     }
 
-    /// Of the first of some places that the cutter leaves more at than the place's limit, both mm, or else of one where it leaves more
-    /// than any limit allows: beside a border it may come lower than elsewhere in a hollow. `None` where a path may hold the limits, as
-    /// far as these places tell.
+    /// Of the first of some places that the cutter leaves more at than the place's limit, both mm, or else of
+    /// one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in a
+    /// hollow. `None` where a path may hold the limits, as far as these places tell.
     pub fn at_or_elsewhere(
         session: &Session,
         cutter: &Cutter,
@@ -108,7 +109,8 @@ impl LeastLeftFigures {
     }
 }
 
-/// A place of the part, and what the best position of the cutter that was found leaves there along its normal, mm.
+/// A place of the part, and what the best position of the cutter that was found leaves there along its
+/// normal, mm.
 #[derive(Clone, Copy)]
 struct Place {
     left: f64,
@@ -116,8 +118,8 @@ struct Place {
     design: SurfacePoint,
 }
 
-/// Places where the cutter leaves most of all nearby, most first: those of a raster that leave more than `least`, mm, and from there
-/// uphill.
+/// Places where the cutter leaves most of all nearby, most first: those of a raster that leave more than
+/// `least`, mm, and from there uphill.
 fn most_left(
     session: &Session,
     cutter: &Cutter,
@@ -200,8 +202,8 @@ mod tests {
     use scene::Scene;
     use work::monitor::Silent;
 
-    /// A bull nose in a hollow cylinder: its flat stands on its corner at the height that the section gives in closed form.
-    /// A ball of the same size says nothing.
+    /// A bull nose in a hollow cylinder: its flat stands on its corner at the height that the section gives
+    /// in closed form. A ball of the same size says nothing.
     #[test]
     fn what_a_flat_leaves_in_a_hollow_is_told_and_not_corrected() {
         let result = |cutter: &str| {
@@ -227,8 +229,8 @@ mod tests {
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
     }
 
-    /// Two planes that meet in a hollow crease under a ball that touches both: along the normal of one, what stands over the crease is
-    /// `r (1 − √(1 − tan² β))`.
+    /// Two planes that meet in a hollow crease under a ball that touches both: along the normal of one, what
+    /// stands over the crease is `r (1 − √(1 − tan² β))`.
     #[test]
     fn passes_are_not_narrowed_for_a_crease_that_no_ball_reaches() {
         let (slope, wide) = (10f64.to_radians().tan(), 6.0);

@@ -125,8 +125,8 @@ fn travelled(machine: &Kinematics, read: &ReadProgram) -> ([[f64; 2]; 5], f64) {
     (ranges, stray)
 }
 
-/// How high the spindle nose has to stand, machine coordinates, mm, for the tip to be over part, stock and fixtures wherever the rotary
-/// axes stand when a program begins, rises or ends.
+/// How high the spindle nose has to stand, machine coordinates, mm, for the tip to be over part, stock and
+/// fixtures wherever the rotary axes stand when a program begins, rises or ends.
 fn over_the_work(run: &Run<'_>, machine: &Kinematics, joints: &JointPath) -> f64 {
     let meshes = run.around.fixtures.iter().map(|(mesh, _)| mesh).chain([run.around.near.mesh()]);
     let vertices: Vec<Point3> = meshes.flat_map(|mesh| mesh.vertices().iter().copied()).collect();
@@ -158,8 +158,8 @@ fn retract_above(z: f64, nose: f64) -> Claim {
 /// Beyond a limit by so little, mm or degrees, a joint is at it.
 const ROUNDING: f64 = 1e-6;
 
-/// That the joints keep to their travels: one claim for those of the linear and one for those of the rotary joints that are
-/// limited. The linear ones may go farther than found by `stray`, mm.
+/// That the joints keep to their travels: one claim for those of the linear and one for those of the rotary
+/// joints that are limited. The linear ones may go farther than found by `stray`, mm.
 fn within_travel(kinematics: &Kinematics, ranges: &[[f64; 2]; 5], stray: f64) -> Vec<Claim> {
     let all = kinematics.letters().into_iter().zip(*ranges).zip(kinematics.limits()).enumerate();
     let beyond = all.filter_map(|(k, ((joint, range), limits))| {

@@ -1,5 +1,6 @@
-//! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
-//! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
+//! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its
+//! numbers, tells them in words, and holds them against their limits; a new one is one file and one line in
+//! [`FIGURES`].
 
 mod bent_rapids;
 mod clearance;
@@ -83,13 +84,15 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
     Ok(found)
 }
 
-/// Material that a toolpath leaves for the next one is no fault of it: those limits, which come second, are the last one's.
+/// Material that a toolpath leaves for the next one is no fault of it: those limits, which come second, are
+/// the last one's.
 pub(crate) fn before_others(claims: Vec<Claim>) -> [Vec<Claim>; 2] {
     let (left, own) = claims.into_iter().partition(|claim| ["uncut", "scallop"].contains(&claim.what));
     [own, left]
 }
 
-/// Limits of material that is left, where other tools of a program may have cut it: they are not violated for sure.
+/// Limits of material that is left, where other tools of a program may have cut it: they are not violated for
+/// sure.
 pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> Vec<Claim> {
     let decided_by = "the other tools of the program may cut there, and each tool is measured by itself";
     let left = |claim: &&mut Claim| ["uncut", "scallop"].contains(&claim.what);

@@ -12,8 +12,8 @@ use crate::run::{Finding, Run};
 /// Distances that are off by less than this, mm, are as asked.
 const AS_ASKED: f64 = 1.0e-6;
 
-/// Of a path along an offset surface. A mesh has none: there passes are put on the level set of its distance, place by
-/// place.
+/// Of a path along an offset surface. A mesh has none: there passes are put on the level set of its distance,
+/// place by place.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(OffsetSurface { along, drive }) = run.planned.strategy.downcast_ref() else {
         return Ok(Finding::default());

@@ -122,7 +122,8 @@ fn exceeding(p: &EngagementFigures) -> Option<FigureTable> {
     })
 }
 
-/// Bound of the error of a measured engagement, degrees: no more of the circumference than the front half can cut.
+/// Bound of the error of a measured engagement, degrees: no more of the circumference than the front half can
+/// cut.
 fn bound_of(pocket: &EngagementFigures, measured: f64) -> f64 {
     pocket.max_engagement_error_bound_deg.min(180.0 - measured)
 }
@@ -226,8 +227,9 @@ fn ramps(run: &Run<'_>, pocket: &Pocket, strategy: &PocketStrategy) -> Claim {
     Claim { unit: "deg", ..Claim::length("ramp", Gravity::Crash, limit, measured, 0.0) }.told(text)
 }
 
-/// The steepest way down below what the level above its pass has cleared, degrees from level; the same less what rounding of
-/// its coordinates may have added; its move. Straight ways, and those above the limit, count where stock `stands` under a move.
+/// The steepest way down below what the level above its pass has cleared, degrees from level; the same less
+/// what rounding of its coordinates may have added; its move. Straight ways, and those above the limit, count
+/// where stock `stands` under a move.
 fn steepest(
     path: &Toolpath,
     top: f64,

@@ -23,8 +23,8 @@ const MEANING: (&str, &str) = (
 /// What decides whether stock stands that tools with unknown cutters may have taken.
 pub(super) const TOOLS_BEFORE: &str = "a table of tools with the cutters of the tools before would decide it";
 
-/// Voxels in the block where the program chooses: more take longer than planning and measuring do, fewer leave engagement
-/// and rates rough.
+/// Voxels in the block where the program chooses: more take longer than planning and measuring do, fewer
+/// leave engagement and rates rough.
 const VOXELS: f64 = 1e6;
 
 /// Where the scene asks for it.
@@ -104,7 +104,8 @@ fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobEr
     Ok(stock)
 }
 
-/// The first move that is not shown to keep out of what stands when it comes, as cells see the stock: a roughed block is whole.
+/// The first move that is not shown to keep out of what stands when it comes, as cells see the stock: a
+/// roughed block is whole.
 pub(super) fn first_in_stock(
     run: &Run<'_>,
     asked: impl Fn(usize) -> Option<KeptOut> + Sync + Send,
@@ -123,7 +124,8 @@ pub(super) fn whole_stock(run: &Run<'_>) -> Stock {
     }
 }
 
-/// Lists a rapid move in stock that the centres of cells do not show, where it is certain; else hands it back.
+/// Lists a rapid move in stock that the centres of cells do not show, where it is certain; else hands it
+/// back.
 fn listed(found: InStock, figures: &mut RemovalFigures) -> Option<InStock> {
     let Some(depth_mm) = found.depth else { return Some(found) };
     let (move_index, at_mm) = (found.move_index, found.at.into());
@@ -182,7 +184,8 @@ fn by_voxels(
     Ok((figures, removed.moves))
 }
 
-/// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks the cutter.
+/// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks
+/// the cutter.
 fn no_rapid_in_stock(removal: &RemovalFigures, program: &str) -> Claim {
     // Less is a touch.
     let claim = |depth, bound| Claim::length("rapid", Gravity::Crash, ENGAGED, depth, bound);

@@ -14,8 +14,8 @@ use crate::run::{Finding, Run};
 struct Row {
     #[serde(flatten)]
     at: SectionFigures,
-    /// The deviation with the least and the greatest distance of the faired curve from the drawn one, where the section was faired. No
-    /// bound: other places may stand lower or higher.
+    /// The deviation with the least and the greatest distance of the faired curve from the drawn one, where
+    /// the section was faired. No bound: other places may stand lower or higher.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_drawing_mm: Option<[f64; 2]>,
 }

@@ -23,8 +23,8 @@ pub struct ShortestFigures {
     pub contact_length_mm: f64,
     /// The first of these over the path's cutting length.
     pub efficiency: f64,
-    /// The first of these at the feed, s: no path below the scallop height that cuts no deeper than the part takes less, whatever its turns
-    /// and links.
+    /// The first of these at the feed, s: no path below the scallop height that cuts no deeper than the part
+    /// takes less, whatever its turns and links.
     pub least_time_s: f64,
     /// That over the path's machining time.
     pub time_efficiency: f64,
@@ -33,7 +33,8 @@ pub struct ShortestFigures {
 }
 
 impl ShortestFigures {
-    /// Of a path with a cutting length, mm, at a feed, mm/min, and a machining time, s; `None` for an empty one.
+    /// Of a path with a cutting length, mm, at a feed, mm/min, and a machining time, s; `None` for an empty
+    /// one.
     pub fn new(shortest: &ShortestPossible, cutting_length_mm: f64, feed: f64, time_s: f64) -> Option<Self> {
         let least_time_s = shortest.cutting_mm / feed * SECONDS_PER_MINUTE;
         (cutting_length_mm > 0.0).then(|| Self {
@@ -50,7 +51,8 @@ impl ShortestFigures {
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let length = path_figures(run.path(), 0.0).cutting_length_mm;
     let (scene, planned) = (run.scene(), run.planned);
-    // Tools that lean take other strips, a path for some slopes covers a part of the whole, and nobody planned a program from elsewhere for a scallop height.
+    // Tools that lean take other strips, a path for some slopes covers a part of the whole, and nobody
+    // planned a program from elsewhere for a scallop height.
     let request = run.request;
     let covers_all = request.axis.is_none() && request.faces() == Faces::ALL && request.foreign().is_none();
     let (true, Step::Scallop(height)) = (covers_all && run.session.pocket.is_none(), request.step) else {

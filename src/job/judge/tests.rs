@@ -146,7 +146,8 @@ fn a_remnant_beside_a_border_answers_to_the_scallop_limit() {
     assert_eq!(not_held(&measured, &STRICT), [("uncut", Verdict::Fail)]);
 }
 
-/// A place that no move cuts away decides by itself, however much more may stand elsewhere; cells alone do not.
+/// A place that no move cuts away decides by itself, however much more may stand elsewhere; cells alone do
+/// not.
 #[test]
 fn what_stands_for_certain_fails_under_an_open_bound() {
     let mut measured = measurement(0.0);

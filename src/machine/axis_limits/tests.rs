@@ -146,7 +146,8 @@ fn the_time_is_that_of_the_quickest_speeds_by_trying_all() {
     }
 }
 
-/// The greatest speeds along an ellipse by small steps, from its derivatives: s, for X and Y of these rates and accelerations.
+/// The greatest speeds along an ellipse by small steps, from its derivatives: s, for X and Y of these rates
+/// and accelerations.
 fn ellipse_by_small_steps([a, b]: [f64; 2], feed: f64, rates: [f64; 2], most: [f64; 2]) -> f64 {
     const STEPS: usize = 100_000;
     let around = |k: usize| 2.0 * std::f64::consts::PI * k as f64 / STEPS as f64;
@@ -283,7 +284,8 @@ fn hill_by_small_steps(kinematics: &Kinematics, feed: f64) -> f64 {
 
 #[test]
 fn every_machine_takes_the_time_of_small_steps() {
-    // Only single axes limit: corners are rounded by the path's own rule, which the smooth hill knows nothing of.
+    // Only single axes limit: corners are rounded by the path's own rule, which the smooth hill knows nothing
+    // of.
     let free = Machine { acceleration: MACHINE.acceleration, junction_deviation: 1.0, ..MACHINE };
     for name in PRESETS {
         let kinematics = on_hill(name);
@@ -295,7 +297,8 @@ fn every_machine_takes_the_time_of_small_steps() {
     }
 }
 
-/// The joints of the smooth hill at even times, by the speeds found on its chords; differences are accelerations and jerks.
+/// The joints of the smooth hill at even times, by the speeds found on its chords; differences are
+/// accelerations and jerks.
 #[test]
 fn no_axis_exceeds_its_jerk() {
     const STEP: f64 = 0.012;

@@ -84,7 +84,8 @@ fn walk(length: f64, moves: u32) -> Vec<[f64; 3]> {
     tips
 }
 
-/// Four times the way takes about four times the time: a search that is stuck in one place stays slow everywhere.
+/// Four times the way takes about four times the time: a search that is stuck in one place stays slow
+/// everywhere.
 #[test]
 fn the_search_does_not_get_stuck_on_long_paths() {
     let own =

@@ -1,10 +1,10 @@
 //! The rotary angles for a tool axis: one spherical triangle for every machine.
 //!
-//! u₁ and u₂ are the directions of the rotary axes, z that of the spindle, a that of the tool. R₁(θ₁) R₂(θ₂) z = a
-//! asks that b = R₂(θ₂) z stands at the angle φ of a from u₁, which R₁ does not change. The triangle of u₁, u₂
-//! and b has the sides γ (u₁ to u₂), δ (u₂ to b) and φ, so that its angle Θ at u₂ comes from the three
-//! sides (half-angle formula, exact for small and for great angles alike), and θ₂ = θ₂₀ ± Θ, with θ₂₀ where b is
-//! nearest to u₁. The angle ψ at u₁ then tells how far R₁ has to turn: θ₁ = azimuth(a) ± ψ.
+//! u₁ and u₂ are the directions of the rotary axes, z that of the spindle, a that of the tool. R₁(θ₁) R₂(θ₂)
+//! z = a asks that b = R₂(θ₂) z stands at the angle φ of a from u₁, which R₁ does not change. The triangle of
+//! u₁, u₂ and b has the sides γ (u₁ to u₂), δ (u₂ to b) and φ, so that its angle Θ at u₂ comes from the three
+//! sides (half-angle formula, exact for small and for great angles alike), and θ₂ = θ₂₀ ± Θ, with θ₂₀ where b
+//! is nearest to u₁. The angle ψ at u₁ then tells how far R₁ has to turn: θ₁ = azimuth(a) ± ψ.
 
 use geometry::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -1,8 +1,8 @@
 //! Which of the two ways, and with how many whole turns, along a whole path: the cheapest in turning.
 //!
-//! On each side of the triangle ([`super::angles`]) the rotary angles follow a move without jumps, and their whole
-//! turns stay what they are. So a state is a side and two counts of turns, and it can change only while the
-//! tool stands: for nothing but the turning where the first axis is free or the two ways meet, and as a
+//! On each side of the triangle ([`super::angles`]) the rotary angles follow a move without jumps, and their
+//! whole turns stay what they are. So a state is a side and two counts of turns, and it can change only while
+//! the tool stands: for nothing but the turning where the first axis is free or the two ways meet, and as a
 //! *rewind*, for which the tool must be clear of the part, anywhere else. Dynamic programming over the path
 //! finds the states with the least sum of turning (rad) and of the prices below.
 
@@ -57,8 +57,8 @@ impl Stop {
     }
 }
 
-/// Gives every stop its azimuths: without jumps, and where the first axis is free first as it came, then as it
-/// has to leave.
+/// Gives every stop its azimuths: without jumps, and where the first axis is free first as it came, then as
+/// it has to leave.
 pub(super) fn unwind(stops: &mut [Stop]) {
     let first = stops.iter().find(|stop| !stop.free);
     // A quarter turn less stands for the lead: a path that is free all along has its first axis at zero.
@@ -89,8 +89,8 @@ pub(super) fn turns_within(angle: f64, limits: [f64; 2]) -> Option<std::ops::Ran
     (from <= to).then_some(from..=to)
 }
 
-/// The whole turns among which to choose: those within limits (of many an even selection, both ends in it); where
-/// there are none, those nearest to them; and without limits those nearest to `near`.
+/// The whole turns among which to choose: those within limits (of many an even selection, both ends in it);
+/// where there are none, those nearest to them; and without limits those nearest to `near`.
 fn choices(angle: f64, axis: &RotaryAxis, near: f64) -> Vec<i32> {
     /// More would take time in proportion, and unwinding by one turn more or less is worth little.
     const MOST: i32 = 5;

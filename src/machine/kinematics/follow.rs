@@ -10,8 +10,8 @@ use crate::kinematics::{choice, report};
 use geometry::Vector3;
 use motion::{ClPoint, MoveKind, Toolpath};
 
-/// A tool axis this near to the first rotary axis, rad, is taken to be along it: the end of a cutter of 100 mm
-/// is off by 0.1 µm, less than programs are rounded.
+/// A tool axis this near to the first rotary axis, rad, is taken to be along it: the end of a cutter of 100
+/// mm is off by 0.1 µm, less than programs are rounded.
 const AT_POLE: f64 = 1e-6;
 
 /// How exactly the tool has to follow the path between locations.
@@ -24,8 +24,8 @@ pub struct Following {
 }
 
 impl Following {
-    /// For a control that keeps the tip on its line and moves rotary joints evenly: the axis strays so little that
-    /// the cutter, `length` mm above its tip, stays within `chord`, mm.
+    /// For a control that keeps the tip on its line and moves rotary joints evenly: the axis strays so little
+    /// that the cutter, `length` mm above its tip, stays within `chord`, mm.
     pub fn with_tip_kept(chord: f64, length: f64) -> Self {
         Self { tip: f64::INFINITY, axis: chord / length }
     }
@@ -43,8 +43,8 @@ pub enum Turn {
     Along,
     /// The first axis turns while tip and tool axis stand still, at a singular pose.
     AtPole,
-    /// The rotary joints go another way or unwind by whole turns: the tool axis sweeps round, and the tool has to
-    /// be clear of the part.
+    /// The rotary joints go another way or unwind by whole turns: the tool axis sweeps round, and the tool
+    /// has to be clear of the part.
     Rewind,
 }
 
@@ -117,16 +117,16 @@ struct Knot {
 
 /// Follows a path with the joints of a machine.
 ///
-/// Of the two ways and the whole turns of the rotary joints those are taken that turn least along the path while
-/// limits are kept. The report tells limits and rewinds that cannot be avoided; [`JointReport::obstacle`] says
-/// whether a program may be made.
+/// Of the two ways and the whole turns of the rotary joints those are taken that turn least along the path
+/// while limits are kept. The report tells limits and rewinds that cannot be avoided;
+/// [`JointReport::obstacle`] says whether a program may be made.
 ///
 /// # Errors
 /// [`PathError`] for tool axes that the machine cannot reach.
 ///
 /// # Tolerance
-/// At all locations [`Kinematics::forward`] gives the path within rounding (tool axes within 1e-6 rad of
-/// a singular pose are taken there); between them the tool stays within `following`, by a proven bound.
+/// At all locations [`Kinematics::forward`] gives the path within rounding (tool axes within 1e-6 rad of a
+/// singular pose are taken there); between them the tool stays within `following`, by a proven bound.
 pub fn follow(
     kinematics: &Kinematics,
     path: &Toolpath,
@@ -223,8 +223,8 @@ fn knots(kinematics: &Kinematics, path: &Toolpath) -> Result<Vec<Knot>, PathErro
     Ok(knots)
 }
 
-/// Where an axis that turns evenly comes closest to `pole` or its opposite within the turn: the share, that end of
-/// the pole, and the angle from it. `None` where it comes closest at an end of the turn.
+/// Where an axis that turns evenly comes closest to `pole` or its opposite within the turn: the share, that
+/// end of the pole, and the angle from it. `None` where it comes closest at an end of the turn.
 pub(super) fn passes(from: &Vector3, to: &Vector3, pole: &Vector3) -> Option<(f64, Vector3, f64)> {
     let whole = angle_between(from, to);
     let normal = from.cross(to).try_normalize(1e-9)?;

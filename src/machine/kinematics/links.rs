@@ -1,18 +1,21 @@
 //! The links of a machine, and how one moves as seen from another along a program.
 //!
-//! Enters: a machine, the joints that a program goes through, mm and rad. Leaves: where a link stands in machine
-//! coordinates, and for each stretch of the program where it begins and ends as seen from another link. Stretches on which
-//! links turn are divided so that between the ends a body runs nearly straight and turns nearly evenly.
+//! Enters: a machine, the joints that a program goes through, mm and rad. Leaves: where a link stands in
+//! machine coordinates, and for each stretch of the program where it begins and ends as seen from another
+//! link. Stretches on which links turn are divided so that between the ends a body runs nearly straight and
+//! turns nearly evenly.
 //!
-//! Links are named by the joint that moves them last, seen from the frame: the frame itself, `Z` that all linear axes move, and each
-//! rotary axis. The linear axes count as if they moved the head. Bodies on the frame and in the table are in machine coordinates,
-//! those in the head have their origin at the spindle nose; all rotary axes at zero.
+//! Links are named by the joint that moves them last, seen from the frame: the frame itself, `Z` that all
+//! linear axes move, and each rotary axis. The linear axes count as if they moved the head. Bodies on the
+//! frame and in the table are in machine coordinates, those in the head have their origin at the spindle
+//! nose; all rotary axes at zero.
 
 use super::{Joints, Kinematics, RotaryAxis, Side};
 use geometry::{Isometry3, Point3, Vector3};
 use nalgebra::{Translation3, UnitQuaternion};
 
-/// How far a place of a body may be off its way between two ends of a stretch, mm. Less makes more stretches, as the root of it.
+/// How far a place of a body may be off its way between two ends of a stretch, mm. Less makes more stretches,
+/// as the root of it.
 pub const STRAY: f64 = 0.005;
 
 /// The most that links turn in a stretch, rad.
@@ -95,7 +98,8 @@ impl Chain {
         }
     }
 
-    /// A machine of three axes: the length from the spindle nose to the tip, and the workpiece's zero in machine coordinates, mm.
+    /// A machine of three axes: the length from the spindle nose to the tip, and the workpiece's zero in
+    /// machine coordinates, mm.
     pub fn three_axes(gauge_length: f64, workpiece_zero: Point3) -> Self {
         Self { kinematics: None, gauge_length, workpiece_zero }
     }
@@ -181,8 +185,9 @@ impl Chain {
         }
     }
 
-    /// How `link` moves as seen from `other`, along a program: so that no place of a body on it, within `reach` of `middle`, is
-    /// off by more than [`STRAY`] if its middle runs straight from end to end and it turns evenly.
+    /// How `link` moves as seen from `other`, along a program: so that no place of a body on it, within
+    /// `reach` of `middle`, is off by more than [`STRAY`] if its middle runs straight from end to end and it
+    /// turns evenly.
     pub fn motion(
         &self,
         program: &[Waypoint],
@@ -209,7 +214,8 @@ impl Chain {
         moves
     }
 
-    /// Into how many parts of even time a stretch is to be divided: straying is an eighth of a bound of second derivatives.
+    /// Into how many parts of even time a stretch is to be divided: straying is an eighth of a bound of
+    /// second derivatives.
     fn parts(
         &self,
         [from, to]: [&Waypoint; 2],

@@ -1,19 +1,19 @@
 //! Five-axis machines: three linear axes and two rotary ones, both in the head, both in the table, or one in
 //! each. Enters: the tool's location in the workpiece; leaves: the five joints, and the other way round.
 //!
-//! Frames. Machine coordinates are those of the linear axes as the machine shows them: the place of the spindle
-//! nose with the head's rotary axes at zero. The workpiece lies in the table with its axes along the
+//! Frames. Machine coordinates are those of the linear axes as the machine shows them: the place of the
+//! spindle nose with the head's rotary axes at zero. The workpiece lies in the table with its axes along the
 //! machine's while the table stands at zero. Lengths in mm, angles in rad.
 //!
 //! Sense. A rotary joint counts as if the tool turned against the workpiece, right-handed about its direction
 //! (ISO 841): a table turns the other way. For a machine that counts otherwise, turn the direction round.
 //!
 //! Order. The *first* rotary axis is the one nearer to the workpiece, the *second* the one nearer to the
-//! cutter. So in all three families the tool axis is a = R₁(θ₁) R₂(θ₂) z, and the first axis is free
-//! where a is parallel to its direction (the singular poses).
+//! cutter. So in all three families the tool axis is a = R₁(θ₁) R₂(θ₂) z, and the first axis is free where a
+//! is parallel to its direction (the singular poses).
 //!
-//! Where a move runs through a singular pose a location is put in. The first axis turns there while the tip stays in place.
-//! Feeds and machining time keep every joint within its rate.
+//! Where a move runs through a singular pose a location is put in. The first axis turns there while the tip
+//! stays in place. Feeds and machining time keep every joint within its rate.
 
 mod angles;
 mod choice;
@@ -258,8 +258,8 @@ impl Kinematics {
         &self.travel
     }
 
-    /// Where the spindle nose is out of the way of everything, machine coordinates, mm: the upper end of Z's travel, or the machine's
-    /// zero where the travel is not known.
+    /// Where the spindle nose is out of the way of everything, machine coordinates, mm: the upper end of Z's
+    /// travel, or the machine's zero where the travel is not known.
     pub fn retracted_z(&self) -> f64 {
         self.travel[2].map_or(0.0, |[_, greatest]| greatest)
     }
@@ -344,8 +344,8 @@ impl Kinematics {
         Joints { linear: table - head, rotary }
     }
 
-    /// The pace of X, Y and Z on a line that moves the tip by `way` and turns the rotary axes by `turns`, over the time of the whole,
-    /// mm, where the tip is at `tip`.
+    /// The pace of X, Y and Z on a line that moves the tip by `way` and turns the rotary axes by `turns`,
+    /// over the time of the whole, mm, where the tip is at `tip`.
     fn pace(&self, tip: Point3, way: Vector3, rotary: [f64; 2], turns: [f64; 2]) -> Vector3 {
         let turn = |k: usize, (at, pace): (Vector3, Vector3), sign: f64| {
             let RotaryAxis { direction, point, .. } = &self.axes[k];
@@ -363,8 +363,8 @@ impl Kinematics {
         table.1 - head.1
     }
 
-    /// The second derivative of that by the share of the line is no greater than this, mm: a turning vector of length v has derivatives
-    /// up to those of `v (1 + turn)^n`.
+    /// The second derivative of that by the share of the line is no greater than this, mm: a turning vector
+    /// of length v has derivatives up to those of `v (1 + turn)^n`.
     fn pace_bends(&self, tip: Point3, way: Vector3, turns: [f64; 2]) -> f64 {
         let on = |side: Side, order: [usize; 2], from: [Vector3; 2], pace: f64| {
             let mut bounds = [0.0, pace, 0.0, 0.0];

@@ -1,7 +1,8 @@
-//! Machines by name: the letters of both rotary axes in the order of the alphabet. Their letters are those of ISO 841 (A turns
-//! about x, B about y, C about z). Which axis carries which: in `ac-head` and `bc-head` C turns the fork that carries
-//! the other; in `ab-head` A carries B. In `ac-table` and `bc-table` the trunnion A or B carries the table C, as in LinuxCNC's
-//! `xyzac-trt` and `xyzbc-trt`, which count angles the other way round; in `ab-table` A carries B.
+//! Machines by name: the letters of both rotary axes in the order of the alphabet. Their letters are those of
+//! ISO 841 (A turns about x, B about y, C about z). Which axis carries which: in `ac-head` and `bc-head` C
+//! turns the fork that carries the other; in `ab-head` A carries B. In `ac-table` and `bc-table` the trunnion
+//! A or B carries the table C, as in LinuxCNC's `xyzac-trt` and `xyzbc-trt`, which count angles the other way
+//! round; in `ab-table` A carries B.
 
 use super::{Kinematics, RotaryAxis, Side};
 use geometry::{Point3, Vector3};
@@ -13,7 +14,8 @@ pub const DEFAULT_GAUGE_LENGTH: f64 = 150.0;
 /// Rotary rate where nothing else is said, rad/s: 30 turns a minute, as trunnions and fork heads have.
 pub const DEFAULT_ROTARY_RATE: f64 = 0.5 * TAU;
 
-/// Rotary acceleration where nothing else is said, rad/s²: a rate of 30 turns a minute is reached in a third of a second.
+/// Rotary acceleration where nothing else is said, rad/s²: a rate of 30 turns a minute is reached in a third
+/// of a second.
 pub const DEFAULT_ROTARY_ACCELERATION: f64 = 10.0;
 
 /// Tilting axes: to both sides beyond the horizontal.

@@ -1,8 +1,8 @@
 //! The joints that a program goes through: its approach, the path, its rises for rewinds, and its end.
 //!
-//! Enters: a path and its joints. Leaves: the joints at the ends of all straight stretches, in order, as posts write them. Where the
-//! machine stands before the first line is not known: the program counts from where X and Y stand over the start at the height of
-//! retract.
+//! Enters: a path and its joints. Leaves: the joints at the ends of all straight stretches, in order, as
+//! posts write them. Where the machine stands before the first line is not known: the program counts from
+//! where X and Y stand over the start at the height of retract.
 
 use super::{Chain, JointPath, Joints, Kinematics, Pace, Turn, Way, Waypoint};
 use geometry::{Point3, Vector3};
@@ -49,8 +49,8 @@ impl JointPath {
     }
 }
 
-/// The joints of the program of an upright path on a machine of three axes: from over its start at its highest tip, or at `rise_to`, mm,
-/// where that is higher, and up there again.
+/// The joints of the program of an upright path on a machine of three axes: from over its start at its
+/// highest tip, or at `rise_to`, mm, where that is higher, and up there again.
 pub fn program_of_three_axes(path: &Toolpath, rise_to: Option<f64>, chain: &Chain) -> Vec<Waypoint> {
     let tips: Vec<Point3> =
         std::iter::once(path.start.tip).chain(path.moves.iter().map(|step| step.to.tip)).collect();

@@ -5,8 +5,8 @@
 //! y(s) that of the joints, e = y − x is zero at both ends, and
 //! |e| ≤ |e″(½)|/8 + M/48 with M ≥ |e‴| (the Green's function of the second derivative: ∫G ds = 1/8,
 //! ∫G |s − ½| ds = 1/48). e″ at the middle is exact; M is a bound carried through the turns and shifts from
-//! the tool to the workpiece. The first term alone is the deviation to leading order, so that the bound costs few
-//! points.
+//! the tool to the workpiece. The first term alone is the deviation to leading order, so that the bound costs
+//! few points.
 
 use super::{Joints, Kinematics, RotaryAxis, Stage};
 use geometry::Vector3;
@@ -96,8 +96,9 @@ pub(super) trait Course {
     fn endless(&self) -> Self::Error;
 }
 
-/// Appends the shares of a course and its joints there, in order and the end included, between which
-/// the tool stays within `tip` (mm; infinite where the control keeps the tip) and `axis` (rad). No two pieces in a row could be one.
+/// Appends the shares of a course and its joints there, in order and the end included, between which the tool
+/// stays within `tip` (mm; infinite where the control keeps the tip) and `axis` (rad). No two pieces in a row
+/// could be one.
 pub(super) fn refine<C: Course>(
     kinematics: &Kinematics,
     course: &C,

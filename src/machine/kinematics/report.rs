@@ -8,12 +8,12 @@ use geometry::{Point3, Vector3};
 use motion::{MoveKind, Toolpath};
 use std::f64::consts::PI;
 
-/// Within this angle of a singular pose the first rotary axis turns by nearly half a turn while the tool hardly
-/// tilts: such places are told, rad (1°).
+/// Within this angle of a singular pose the first rotary axis turns by nearly half a turn while the tool
+/// hardly tilts: such places are told, rad (1°).
 pub const SINGULAR_ANGLE: f64 = PI / 180.0;
 
-/// Rotary joints turn by no more than this between two looks at the pace of linear ones, rad. What it may be greater by in between is
-/// added: a twenty thousandth where one axis turns.
+/// Rotary joints turn by no more than this between two looks at the pace of linear ones, rad. What it may be
+/// greater by in between is added: a twenty thousandth where one axis turns.
 const PACE_TURN: f64 = 0.02;
 
 /// Linear joints come no farther than is told by this, mm.
@@ -212,7 +212,8 @@ impl JointPath {
         // Where the control keeps the tip on its line, linear joints run along curves.
         let (way, turns) = (end - tip, [b[3] - a[3], b[4] - a[4]]);
         let parts = (paces[3].max(paces[4]) / PACE_TURN).ceil().max(1.0);
-        // Off the chord between two looks a function is by an eighth of its second derivative times their distance squared.
+        // Off the chord between two looks a function is by an eighth of its second derivative times their
+        // distance squared.
         let between = kinematics.pace_bends(*tip, way, turns) / (8.0 * parts * parts);
         for part in 0..=parts as u32 {
             let share = f64::from(part) / parts;
@@ -225,8 +226,8 @@ impl JointPath {
 }
 
 impl JointPath {
-    /// The fastest motion of each joint, mm/s and rad/s, where every move runs at its feed, or as fast as its slowest joint
-    /// lets it. `rapid_rate` in mm/min.
+    /// The fastest motion of each joint, mm/s and rad/s, where every move runs at its feed, or as fast as its
+    /// slowest joint lets it. `rapid_rate` in mm/min.
     pub fn fastest(&self, kinematics: &Kinematics, path: &Toolpath, rapid_rate: f64) -> [f64; 5] {
         let mut fastest = [0.0f64; 5];
         let (mut last, mut tip) = (self.start, path.start.tip);
@@ -250,8 +251,8 @@ impl JointPath {
         fastest
     }
 
-    /// The highest nose, machine coordinates, mm, at which programs come down to the path or leave it: over all its tips
-    /// along the machine's z.
+    /// The highest nose, machine coordinates, mm, at which programs come down to the path or leave it: over
+    /// all its tips along the machine's z.
     pub fn highest_nose(&self, kinematics: &Kinematics, path: &Toolpath) -> f64 {
         let rewinds = self.locations.iter().filter(|at| at.turn == Turn::Rewind);
         let poses = rewinds.chain(self.locations.last()).map(|at| (at.joints, at.at.tip));
@@ -270,8 +271,9 @@ fn join(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 }
 
 impl Kinematics {
-    /// Least and greatest values of the linear joints, mm, where the tip runs straight from one place to another while the rotary joints
-    /// turn evenly. Those that are no farther out than `known` need not be the extremes.
+    /// Least and greatest values of the linear joints, mm, where the tip runs straight from one place to
+    /// another while the rotary joints turn evenly. Those that are no farther out than `known` need not be
+    /// the extremes.
     ///
     /// # Tolerance
     /// [`FARTHEST`]
@@ -293,8 +295,8 @@ impl Kinematics {
         while let Some(([low, high], [a, b])) = ahead.pop() {
             let share = 0.5 * (low + high);
             let middle = at(share);
-            // Off its chord a function is by an eighth of its second derivative in the middle, which is four second differences, and a
-            // 48th of a bound of the third each for either.
+            // Off its chord a function is by an eighth of its second derivative in the middle, which is four
+            // second differences, and a 48th of a bound of the third each for either.
             let third = bend * (high - low).powi(3) / 24.0;
             let mut is_open = false;
             for k in 0..3 {
@@ -311,7 +313,8 @@ impl Kinematics {
         reached
     }
 
-    /// The place over a tip along the machine's z that is as high as the highest tip of the path while the table stands so.
+    /// The place over a tip along the machine's z that is as high as the highest tip of the path while the
+    /// table stands so.
     pub fn over(&self, path: &Toolpath, rotary: [f64; 2], tip: Point3) -> Point3 {
         let up = self.upward(rotary);
         let height = |tip: &Point3| up.dot(&tip.coords);

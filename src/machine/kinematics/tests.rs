@@ -110,7 +110,8 @@ proptest! {
             Translation3::from(point.coords) * turn * Translation3::from(-point.coords)
         };
         let (mut table, mut head) = (Isometry3::identity(), Isometry3::identity());
-        // Tables: the second carries the first and turns against the count. Heads: the first carries the second.
+        // Tables: the second carries the first and turns against the count. Heads: the first carries the
+        // second.
         for k in [1, 0] {
             if machine.axes()[k].side == Side::Table {
                 table *= about(k, -rotary[k]);
@@ -241,8 +242,9 @@ fn what_is_no_machine_is_refused_with_a_cure() {
     assert!(Kinematics::new(first, second, 0.0, Point3::new(f64::NAN, 0.0, 0.0), [None; 3]).is_err());
 }
 
-/// LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`: a point of the workpiece turns by C about the table's axis, then by A or B about
-/// the trunnion's, each as the table itself turns. That is the other way round than ISO 841 counts.
+/// LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`: a point of the workpiece turns by C about the table's
+/// axis, then by A or B about the trunnion's, each as the table itself turns. That is the other way round
+/// than ISO 841 counts.
 #[test]
 fn tables_with_trunnions_are_those_of_linuxcnc_turned_round() {
     let (centre, trunnion) = (Vector3::new(12.0, -7.0, 0.0), Vector3::new(5.0, 9.0, -40.0));

@@ -1,7 +1,7 @@
 //! Looks closer where more may stand or lie between the places than was found there.
 //!
-//! Enters: triangles with what was cut at their corners and the ridges that cross them. Leaves: the greatest figures, and
-//! how much they may still be exceeded by. mm.
+//! Enters: triangles with what was cut at their corners and the ridges that cross them. Leaves: the greatest
+//! figures, and how much they may still be exceeded by. mm.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -34,8 +34,8 @@ impl Figure {
     const ALL: [Self; 4] = [Self::Depth, Self::Ridge, Self::Border, Self::Uncut];
 }
 
-/// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge, the highest place along
-/// the border that passes came down to.
+/// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge, the
+/// highest place along the border that passes came down to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Possible {
     pub depth: f64,
@@ -94,7 +94,8 @@ struct Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// Whether a figure is to be known more closely: where it may be exceeded by more than is asked, or a limit hangs on it.
+    /// Whether a figure is to be known more closely: where it may be exceeded by more than is asked, or a
+    /// limit hangs on it.
     fn is_open(&self, possible: &Possible, figure: Figure, greatest: &Greatest) -> bool {
         let limit = match figure {
             Figure::Depth => self.limits.gouge,
@@ -162,7 +163,8 @@ impl Ord for Waiting {
     }
 }
 
-/// Keeps no more triangles than so many: of each figure the most promising ones. Returns what is possible in the others.
+/// Keeps no more triangles than so many: of each figure the most promising ones. Returns what is possible in
+/// the others.
 fn keep_most_promising(open: &mut Vec<Open>, most: usize) -> Possible {
     let mut kept = 0;
     for (turn, figure) in Figure::ALL.into_iter().enumerate() {
@@ -256,16 +258,17 @@ struct Closer {
     crossings: Vec<Crossing>,
 }
 
-/// How deep a move may cut in a triangle by the planes that touch the cut at the corners, mm. What one straight move cuts is
-/// hollow or straight in every direction. So its height over the design lies above each of these planes, less what the
-/// design rises off its own where it is hollow itself.
+/// How deep a move may cut in a triangle by the planes that touch the cut at the corners, mm. What one
+/// straight move cuts is hollow or straight in every direction. So its height over the design lies above each
+/// of these planes, less what the design rises off its own where it is hollow itself.
 fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
     let way = |i: usize, j: usize| samples[j].place.point - samples[i].place.point;
     let hollow = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| rise(samples, i, j)).into_iter().fold(0.0, f64::max);
     let of_corner = |i: usize| {
         let sample = &samples[i];
         let hit = sample.hit.filter(|hit| hit.by == by)?;
-        // Along the normals the design counts as plane; on a ridge the plane is met along any way out that the corners tell.
+        // Along the normals the design counts as plane; on a ridge the plane is met along any way out that
+        // the corners tell.
         let (cos, across, deep, hollow) = match hit.way {
             Way::Normal => {
                 let cos = hit.normal.dot(&sample.place.normal);
@@ -284,7 +287,8 @@ fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
     (0..3).filter_map(of_corner).fold(f64::INFINITY, f64::min)
 }
 
-/// The least cosine between the normal of a cut and the ways out of ridges at the corners of a triangle; `None` where one is none.
+/// The least cosine between the normal of a cut and the ways out of ridges at the corners of a triangle;
+/// `None` where one is none.
 fn least_cosine(samples: &[Sample; 3], normal: &Vector3) -> Option<f64> {
     let cosines = samples.iter().filter_map(|sample| sample.hit).map(|hit| match hit.way {
         Way::Normal => f64::INFINITY,
@@ -294,7 +298,8 @@ fn least_cosine(samples: &[Sample; 3], normal: &Vector3) -> Option<f64> {
     Some(cosines.fold(f64::INFINITY, f64::min)).filter(|cos| *cos > 0.0)
 }
 
-/// How the design rises off its tangent planes at both ends of a side, together, mm: positive where it is hollow.
+/// How the design rises off its tangent planes at both ends of a side, together, mm: positive where it is
+/// hollow.
 fn rise(samples: &[Sample; 3], i: usize, j: usize) -> f64 {
     let [a, b] = [&samples[i].place, &samples[j].place];
     -(b.normal - a.normal).dot(&(b.point - a.point))
@@ -335,7 +340,8 @@ impl NormalInspection<'_> {
         found
     }
 
-    /// How deep anything may be cut along the normals of a triangle, by how near tools come to the line along one of them, mm.
+    /// How deep anything may be cut along the normals of a triangle, by how near tools come to the line along
+    /// one of them, mm.
     fn depth_by_distance(&self, samples: &[Sample; 3]) -> f64 {
         let places = samples.map(|sample| sample.place);
         let middle = Point3::from(places.iter().map(|place| place.point.coords).sum::<Vector3>() / 3.0);
@@ -347,9 +353,9 @@ impl NormalInspection<'_> {
         self.engine.depth_at_most(&middle, &normal, aside)
     }
 
-    /// How high material stands at most along the sides of a triangle that are the border, as far as passes came down to it. What
-    /// one move leaves is hollow or straight, so that it is highest at an end of a side or at the ridge where another one takes
-    /// over, but for what the design sinks between the ends.
+    /// How high material stands at most along the sides of a triangle that are the border, as far as passes
+    /// came down to it. What one move leaves is hollow or straight, so that it is highest at an end of a side
+    /// or at the ridge where another one takes over, but for what the design sinks between the ends.
     fn border_at_most(&self, samples: &[Sample; 3], on_border: [bool; 3], crossings: &[Crossing]) -> f64 {
         let of_side = |k: usize| {
             let (i, j) = (k, (k + 1) % 3);
@@ -368,20 +374,21 @@ impl NormalInspection<'_> {
         (0..3).filter(|&k| on_border[k]).map(of_side).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// How deep a move may cut near the corners of a triangle that it cut, by how steep it is there: no place is farther than
-    /// `far` from a corner, mm.
+    /// How deep a move may cut near the corners of a triangle that it cut, by how steep it is there: no place
+    /// is farther than `far` from a corner, mm.
     fn depth_around(&self, samples: &[Sample; 3], by: u32, far: f64) -> f64 {
         let of_corner = |sample: &Sample| {
             let slope = sample.slope();
-            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
+            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below
+            // that.
             let deeper = (slope * far).min(slope * slope * self.radius);
             sample.hit.filter(|hit| hit.by == by).map(|hit| deeper - hit.deviation)
         };
         samples.iter().filter_map(of_corner).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Divides triangles, the most promising ones first, for one figure after the other: what is left open of one does not keep
-    /// another one open. Returns by how much the figures may still be exceeded, mm.
+    /// Divides triangles, the most promising ones first, for one figure after the other: what is left open of
+    /// one does not keep another one open. Returns by how much the figures may still be exceeded, mm.
     pub fn search<'b>(
         &self,
         triangles: impl Iterator<Item = ([Sample; 3], [bool; 3], &'b [Crossing])>,

@@ -5,13 +5,13 @@
 //!
 //! Deviations are exact at the places. A ridge stands between two neighbouring places that different tracks
 //! cut; it is found on the line between them where both cut equally high, from the heights and slopes at the
-//! places. Its length is that of the way from crossing to crossing through the triangles of the net.
-//! Where more may stand or lie between the places than was found, by the slope of the cut there, triangles are
-//! divided until the asked bound holds, or a closer one where a limit hangs on it, or [`MOST_DIVIDED`] of them are. A track that
-//! no place saw is seen all the same: the contacts of every move are places too.
+//! places. Its length is that of the way from crossing to crossing through the triangles of the net. Where
+//! more may stand or lie between the places than was found, by the slope of the cut there, triangles are
+//! divided until the asked bound holds, or a closer one where a limit hangs on it, or [`MOST_DIVIDED`] of
+//! them are. A track that no place saw is seen all the same: the contacts of every move are places too.
 //!
-//! Engines by samples may miss what cuts between them: each place has a bound on how much deeper it may be cut
-//! ([`NormalHit::uncertain`]), which goes into the bounds of the figures.
+//! Engines by samples may miss what cuts between them: each place has a bound on how much deeper it may be
+//! cut ([`NormalHit::uncertain`]), which goes into the bounds of the figures.
 //!
 //! What stands above the uncut tolerance is uncut, unless it is a scallop (`reached`).
 
@@ -50,8 +50,8 @@ use sim::RayHit;
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Lines meet what was cut to within this over the sine of the angle between them, mm: ten times what rays tell, since the angle is that of
-/// a place a little before.
+/// Lines meet what was cut to within this over the sine of the angle between them, mm: ten times what rays
+/// tell, since the angle is that of a place a little before.
 const GRAZING: f64 = 1e-8;
 
 /// What a deviation is measured along.
@@ -84,12 +84,14 @@ pub struct NormalHit {
 
 /// An engine that tells where lines along normals meet the cut surface.
 pub trait AlongNormal: Sync {
-    /// The lowest place that was cut on the line through `point` along the unit `normal`; `None` where nothing was
-    /// within [`AlongNormal::reach`]. What was cut nearby, if anything is known, only makes it faster.
+    /// The lowest place that was cut on the line through `point` along the unit `normal`; `None` where
+    /// nothing was within [`AlongNormal::reach`]. What was cut nearby, if anything is known, only makes it
+    /// faster.
     fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit>;
 
-    /// Where a move, and those of its pass that go on where it ends, would meet the line if no others cut; `None` also where that is
-    /// too deep to be told by them alone, and of engines that cannot tell moves apart.
+    /// Where a move, and those of its pass that go on where it ends, would meet the line if no others cut;
+    /// `None` also where that is too deep to be told by them alone, and of engines that cannot tell moves
+    /// apart.
     fn cut_by(&self, _point: &Point3, _normal: &Vector3, _by: u32) -> Option<RayHit> {
         None
     }
@@ -102,7 +104,8 @@ pub trait AlongNormal: Sync {
     /// How far outward is looked, mm.
     fn reach(&self) -> f64;
 
-    /// How high material stands at least on the line through `point` along `normal` where nothing was cut, mm.
+    /// How high material stands at least on the line through `point` along `normal` where nothing was cut,
+    /// mm.
     fn standing(&self, _point: &Point3, _normal: &Vector3) -> f64 {
         self.reach()
     }
@@ -115,7 +118,8 @@ pub trait AlongNormal: Sync {
     /// How far inward is looked, mm.
     fn depth(&self) -> f64;
 
-    /// How deep anything is cut at most along lines no farther than `aside` mm from that through `point` along `normal`, mm.
+    /// How deep anything is cut at most along lines no farther than `aside` mm from that through `point`
+    /// along `normal`, mm.
     fn depth_at_most(&self, _point: &Point3, _normal: &Vector3, _aside: f64) -> f64 {
         self.depth()
     }
@@ -146,7 +150,8 @@ struct Sample {
 }
 
 impl Sample {
-    /// How fast the deviation changes along the surface: the tangent of the angle between cut and design; on a ridge at most.
+    /// How fast the deviation changes along the surface: the tangent of the angle between cut and design; on
+    /// a ridge at most.
     fn slope(&self) -> f64 {
         self.hit.map_or(0.0, |hit| {
             let tan = |along: &Vector3| {
@@ -199,8 +204,9 @@ struct NormalInspection<'a> {
     most_divided: usize,
 }
 
-/// Measures what `engine` tells of the cut by `path` at places `spacing` mm apart, looking closer until the error bounds
-/// are the asked one, mm. Figures are those of the judged share of the part, the map is of all of it.
+/// Measures what `engine` tells of the cut by `path` at places `spacing` mm apart, looking closer until the
+/// error bounds are the asked one, mm. Figures are those of the judged share of the part, the map is of all
+/// of it.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -223,8 +229,8 @@ pub fn measure_along_normals(
     along.measure(net, &kept, &keep, &|_| true, monitor)
 }
 
-/// No more than the ridges and the remnants along borders of what [`measure_along_normals`] measures, at places `spacing` mm
-/// apart: nothing is looked at closer, so that bounds are wide.
+/// No more than the ridges and the remnants along borders of what [`measure_along_normals`] measures, at
+/// places `spacing` mm apart: nothing is looked at closer, so that bounds are wide.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -275,7 +281,8 @@ impl Along<'_> {
         NormalInspection { part, cutters, path, engine, finder, limits, spacing, radius, most_divided }
     }
 
-    /// Measures the places of a net that are `kept`, and of the contacts of the moves that come `near` those to `keep`.
+    /// Measures the places of a net that are `kept`, and of the contacts of the moves that come `near` those
+    /// to `keep`.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -430,7 +437,8 @@ impl NormalInspection<'_> {
         Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }
 
-    /// The ridges without those in hollows that the cutter does not fit, which are uncut; the highest of these.
+    /// The ridges without those in hollows that the cutter does not fit, which are uncut; the highest of
+    /// these.
     fn without_hollows(&self, of_triangle: Vec<Vec<Crossing>>) -> (Grouped<Crossing>, Option<Crossing>) {
         let mut hollow: Option<Crossing> = None;
         let scallops = of_triangle.into_iter().map(|mut crossings| {
@@ -464,8 +472,9 @@ impl NormalInspection<'_> {
     }
 }
 
-/// The highest material: of ridges, of the highest place that stands up to the uncut tolerance, where passes came down to the
-/// design, and of what is uncut. `left` is how much more than that place may stand along the border, mm.
+/// The highest material: of ridges, of the highest place that stands up to the uncut tolerance, where passes
+/// came down to the design, and of what is uncut. `left` is how much more than that place may stand along the
+/// border, mm.
 fn excess_figures(
     highest: Option<(f64, Sample)>,
     scallop: &ScallopFigures,
@@ -502,7 +511,8 @@ fn certain(height: f64, sample: &Sample) -> f64 {
     (height - sample.hit.map_or(0.0, |hit| hit.uncertain) - NUMERICAL_FLOOR).max(0.0)
 }
 
-/// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the whole.
+/// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the
+/// whole.
 fn in_runs<T: Send>(
     what: &str,
     count: usize,
@@ -581,8 +591,8 @@ fn tally(of_triangle: &Grouped<Crossing>, cutter: &Cutter, spacing: f64) -> Pair
     tally
 }
 
-/// Crossings of one triangle with half the way to the other crossing of the same two passes; where ridges meet, to the
-/// middle of all.
+/// Crossings of one triangle with half the way to the other crossing of the same two passes; where ridges
+/// meet, to the middle of all.
 fn with_lengths(mut found: Vec<Crossing>) -> Vec<Crossing> {
     let middle = |chosen: &dyn Fn(&Crossing) -> bool| {
         let add = |(sum, n): (Vector3, u32), c: &Crossing| (sum + c.at.coords, n + 1);
@@ -598,7 +608,8 @@ fn with_lengths(mut found: Vec<Crossing>) -> Vec<Crossing> {
     found
 }
 
-/// Where a cutting move touches the part, at its middle and its end; nothing where it is farther off than `spacing`.
+/// Where a cutting move touches the part, at its middle and its end; nothing where it is farther off than
+/// `spacing`.
 fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing: f64) -> Vec<NetPlace> {
     let step = &path.moves[k];
     if !step.kind.is_on_surface() {

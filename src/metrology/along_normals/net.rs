@@ -1,7 +1,8 @@
 //! Places of the design surface to be measured at, joined to triangles.
 //!
-//! Enters: the part and a distance. Leaves: points and outward unit normals no farther apart than that, on patches
-//! exact and in even steps of the parameters, on meshes on the facets; and a way to ask for places in between. mm.
+//! Enters: the part and a distance. Leaves: points and outward unit normals no farther apart than that, on
+//! patches exact and in even steps of the parameters, on meshes on the facets; and a way to ask for places in
+//! between. mm.
 
 use geometry::{Point3, Vector3};
 use part::{Part, PatchPoint, SurfacePoint};

@@ -1,21 +1,22 @@
 //! Whether what stands above the uncut tolerance is a tall scallop, or material that no pass came down to.
 //!
-//! The rule is that of cells: a ridge is a scallop when one of the passes that meet in it touches the design nearby, and a
-//! place below such a ridge is part of it when the pass that cut there came down to the design.
+//! The rule is that of cells: a ridge is a scallop when one of the passes that meet in it touches the design
+//! nearby, and a place below such a ridge is part of it when the pass that cut there came down to the design.
 
 use super::ridges::Crossing;
 use super::{NormalInspection, Sample};
 use geometry::{Point3, Vector3};
 
-/// A pass serves a ridge when it touches the design within this many distances of the two contacts. On a plane it is half of
-/// one; in a hollow of radius 4/3 of the cutter's, two.
+/// A pass serves a ridge when it touches the design within this many distances of the two contacts. On a
+/// plane it is half of one; in a hollow of radius 4/3 of the cutter's, two.
 const FARTHEST_CONTACT: f64 = 2.0;
 
 /// A place is no higher than a ridge when it rises above it by no more than this share.
 const RIDGE_IS_TOP: f64 = 1e-3;
 
 impl NormalInspection<'_> {
-    /// True for a ridge within the uncut tolerance, and for a higher one between passes that came down to the design.
+    /// True for a ridge within the uncut tolerance, and for a higher one between passes that came down to the
+    /// design.
     pub fn is_scallop(&self, crossing: &Crossing) -> bool {
         if crossing.height <= self.limits.uncut {
             return true;
@@ -27,7 +28,8 @@ impl NormalInspection<'_> {
         contacts.iter().any(serves)
     }
 
-    /// True where material above the uncut tolerance is no part of a scallop; `highest_ridge` is the highest of those, mm.
+    /// True where material above the uncut tolerance is no part of a scallop; `highest_ridge` is the highest
+    /// of those, mm.
     pub fn is_uncut(&self, sample: &Sample, highest_ridge: f64) -> bool {
         let Some(hit) = sample.hit else { return true };
         hit.deviation > self.limits.uncut

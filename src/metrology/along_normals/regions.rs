@@ -129,8 +129,9 @@ pub(super) fn deviation_figures(samples: &[Sample], areas: &[f64], kept: &[bool]
     DeviationFigures { samples: judged().count(), ..DeviationFigures::of(hits) }
 }
 
-/// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way belong together,
-/// across the borders of facets and patches too. Each in the order of its places, regions in that of their first one.
+/// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way
+/// belong together, across the borders of facets and patches too. Each in the order of its places, regions in
+/// that of their first one.
 pub(crate) fn connected(net: &Net, spacing: f64, inside: &dyn Fn(u32) -> bool) -> Vec<Vec<u32>> {
     let marked: Vec<u32> = (0..net.places.len() as u32).filter(|&k| inside(k)).collect();
     let cell = |k: u32| (net.places[k as usize].point.coords / spacing).map(|x| x.floor() as i64);

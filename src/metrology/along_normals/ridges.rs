@@ -7,21 +7,23 @@ use geometry::{Point3, Vector3};
 use part::Part;
 use sim::RayHit;
 
-/// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then
-/// miss is of the order of its square.
+/// A crossing is found when both tracks were seen within this share of the side from each other: what the
+/// tangents then miss is of the order of its square.
 pub(super) const CLOSE: f64 = 1e-3;
 
 /// The same where heights within a few per cent are enough.
 pub(super) const NEARLY: f64 = 0.1;
 
-/// Looks are taken this share of the side before and beyond where the crossing should be, so that both tracks are seen.
+/// Looks are taken this share of the side before and beyond where the crossing should be, so that both tracks
+/// are seen.
 const ASIDE: f64 = 2e-4;
 
 /// Looks of the search for one crossing; of these so many by tangents, the others halve the way.
 const MOST_LOOKS: usize = 32;
 const BY_TANGENTS: usize = 8;
 
-/// Tracks are equally high within this, mm, ten times what rays tell, and a look along all moves that finds as much is one at them.
+/// Tracks are equally high within this, mm, ten times what rays tell, and a look along all moves that finds
+/// as much is one at them.
 const EQUALLY_HIGH: f64 = 1e-8;
 const SAME: f64 = 2e-8;
 
@@ -99,7 +101,8 @@ impl Finder<'_> {
                 return found.extend(self.crossing_of(&met, hit.uncertain));
             }
             if lower > 0.0 && depth > 0 {
-                // One cuts there that neither end knows: a track between them, or moves farther on along one of theirs.
+                // One cuts there that neither end knows: a track between them, or moves farther on along one
+                // of theirs.
                 let here = End { t: met.t, place, hit };
                 self.search(from, to, [a, here], depth - 1, found);
                 return self.search(from, to, [here, b], depth - 1, found);
@@ -148,7 +151,8 @@ impl Finder<'_> {
         let steepest = rise_over(&a, &a, &b).abs().max(rise_over(&b, &a, &b).abs());
         // Beside a wall one track ends: the ridge is the higher edge.
         let smooth = x >= 0.0 && x <= rest && (height - top).abs() <= steepest * rest + 1e-9;
-        // Tangents of cuts that nearly hold the normal meet anywhere; no hit was looked for beyond the engine's reach.
+        // Tangents of cuts that nearly hold the normal meet anywhere; no hit was looked for beyond the
+        // engine's reach.
         let smooth = smooth && height <= top.max(self.engine.reach());
         let place = from.towards(to, if smooth { a.t + x } else { 0.5 * (a.t + b.t) }, self.part);
         let height = if smooth { height } else { top };
@@ -164,8 +168,9 @@ impl Finder<'_> {
         });
     }
 
-    /// Where on the way from `a` to `b` the moves that cut these, with those that go on where they end, would meet the normal equally
-    /// high; `None` where they do not tell it alone. Two moves are asked much faster than all.
+    /// Where on the way from `a` to `b` the moves that cut these, with those that go on where they end, would
+    /// meet the normal equally high; `None` where they do not tell it alone. Two moves are asked much faster
+    /// than all.
     fn meeting_of_moves(&self, from: &NetPlace, to: &NetPlace, [a, b]: [&End; 2]) -> Option<Meeting> {
         let rest = b.t - a.t;
         let bend = (b.place.point - a.place.point).norm_squared() / self.radius / (rest * rest);
@@ -247,7 +252,8 @@ fn rise_over(end: &End, a: &End, b: &End) -> f64 {
     -end.hit.normal.dot(&way) / end.hit.normal.dot(&end.place.normal).max(1e-9)
 }
 
-/// Where after `a`, and how high, two parabolas of the same bend meet that leave the ends with the slopes of their cuts.
+/// Where after `a`, and how high, two parabolas of the same bend meet that leave the ends with the slopes of
+/// their cuts.
 fn meeting(a: &End, b: &End, bend: f64) -> [f64; 2] {
     let rest = b.t - a.t;
     let [fa, fb] = [a, b].map(|end| rise_over(end, a, b));

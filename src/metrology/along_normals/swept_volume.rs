@@ -1,7 +1,8 @@
 //! The cut as the volume that the tool swept, whatever engine tells where a line meets it.
 //!
-//! A normal through a thin trailing edge comes out on the far side, where the passes of that side have cut everything. So cuts
-//! are looked for close to the design first, and count only as far as a ball fits inside the part.
+//! A normal through a thin trailing edge comes out on the far side, where the passes of that side have cut
+//! everything. So cuts are looked for close to the design first, and count only as far as a ball fits inside
+//! the part.
 
 use super::{AlongNormal, NormalHit, Way};
 use crate::beneath::{Bounding, ball_beneath, corner_at, face_before, leads_out, thinner};
@@ -11,26 +12,29 @@ use motion::Toolpath;
 use part::Part;
 use sim::{RayHit, Rays, VoxelEngine, Voxels};
 
-/// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from the far side
-/// of a thin part: chords cut less deep, and where the part is as thin as that it ends. Looking deep at once would find
-/// all the moves along the far side, and tell which of them is the first in the program.
+/// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from
+/// the far side of a thin part: chords cut less deep, and where the part is as thin as that it ends. Looking
+/// deep at once would find all the moves along the far side, and tell which of them is the first in the
+/// program.
 const NEAR: f64 = 0.1;
 
 /// How many times deeper is looked on a ridge that is cut as deep as was looked.
 const DEEPER: f64 = 4.0;
 
-/// So many moves before or after one of a track are asked with it, where it cuts within this share of its end.
+/// So many moves before or after one of a track are asked with it, where it cuts within this share of its
+/// end.
 const BESIDE: usize = 4;
 const AT_END: f64 = 1e-6;
 
-/// Steps along a line in search of what was cut beside it, and the least one as a share of how far aside is looked.
+/// Steps along a line in search of what was cut beside it, and the least one as a share of how far aside is
+/// looked.
 const MOST_STEPS: usize = 64;
 const LEAST_STEP: f64 = 0.05;
 
 /// An engine that tells where a line first meets what was cut.
 pub trait FirstCut: Sync {
-    /// The lowest place of the line through `point` along the unit `normal`, within a range, that was cut; the begin of the
-    /// range where all is cut away there. A place that was cut nearby may make it faster.
+    /// The lowest place of the line through `point` along the unit `normal`, within a range, that was cut;
+    /// the begin of the range where all is cut away there. A place that was cut nearby may make it faster.
     fn first_cut(
         &self,
         point: &Point3,
@@ -39,8 +43,8 @@ pub trait FirstCut: Sync {
         near: Option<&NormalHit>,
     ) -> Option<NormalHit>;
 
-    /// The same of a move alone, and of those of its pass that go on where it ends; `None` also where the engine cannot tell
-    /// moves apart.
+    /// The same of a move alone, and of those of its pass that go on where it ends; `None` also where the
+    /// engine cannot tell moves apart.
     fn cut_by(&self, _point: &Point3, _normal: &Vector3, _range: [f64; 2], _by: u32) -> Option<RayHit> {
         None
     }
@@ -50,8 +54,8 @@ pub trait FirstCut: Sync {
         None
     }
 
-    /// Up to where, from the begin of a range on, nothing within `aside` mm of the line was cut; the begin where that is not
-    /// known.
+    /// Up to where, from the begin of a range on, nothing within `aside` mm of the line was cut; the begin
+    /// where that is not known.
     fn free_up_to(&self, _point: &Point3, _normal: &Vector3, [low, _]: [f64; 2], _aside: f64) -> f64 {
         low
     }
@@ -124,7 +128,8 @@ impl FirstCut for RaysCut<'_> {
             if free >= high {
                 return high;
             }
-            // A ball about a place of the line, as far as the nearest tool, holds the surroundings of a piece of it.
+            // A ball about a place of the line, as far as the nearest tool, holds the surroundings of a piece
+            // of it.
             let far = high - low + aside;
             let distance =
                 self.rays.moves().nearest(&(point + normal * free), far).map_or(far, |hit| hit.distance);
@@ -217,8 +222,9 @@ pub struct SweptVolume<'a> {
     pub inward: f64,
     /// How far above it, mm.
     pub outward: f64,
-    /// Of cuts that are no deeper than this it is not asked how thick the part is, mm: they hold every limit. Infinite where the profile of the cut is
-    /// wanted; then no more is left out than what the far side of a thin part has lost.
+    /// Of cuts that are no deeper than this it is not asked how thick the part is, mm: they hold every limit.
+    /// Infinite where the profile of the cut is wanted; then no more is left out than what the far side of a
+    /// thin part has lost.
     pub shallow: f64,
     /// The block that is cut, mm.
     pub block: Aabb,
@@ -230,8 +236,8 @@ impl SweptVolume<'_> {
         self.ways_out(point, normal).into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// How far lines as far as `within` mm aside run to the block's faces at most, mm: the way out rises by the slope of the design against
-    /// the face.
+    /// How far lines as far as `within` mm aside run to the block's faces at most, mm: the way out rises by
+    /// the slope of the design against the face.
     pub(crate) fn way_out_within(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
         let rising = |(way, n): (f64, &f64)| way + within * (1.0 - n * n).max(0.0).sqrt() / n.abs();
         let ways = self.ways_out(point, normal).into_iter().zip(normal.iter());
@@ -246,8 +252,8 @@ impl SweptVolume<'_> {
         })
     }
 
-    /// The cut of a ridge whose faces have this sum of unit normals, no deeper than the second of two depths, mm: first no
-    /// deeper than the first is looked, since deep in the part others may have cut.
+    /// The cut of a ridge whose faces have this sum of unit normals, no deeper than the second of two depths,
+    /// mm: first no deeper than the first is looked, since deep in the part others may have cut.
     fn on_ridge(
         &self,
         point: &Point3,
@@ -264,7 +270,8 @@ impl SweptVolume<'_> {
             let hit = hit.unwrap_or(NormalHit { deviation: 0.0, normal: out, ..found });
             let deviation = hit.deviation.min(0.0);
             let met = NormalHit { deviation, way: Way::OutOfRidge(out), ..hit };
-            // What is left beyond the part is no part of the ridge. Where the way leads out through a third face, it is a corner.
+            // What is left beyond the part is no part of the ridge. Where the way leads out through a third
+            // face, it is a corner.
             let face = face_before(self.part, point, &out, deviation);
             if face.is_none() && deviation > -depth {
                 return met;

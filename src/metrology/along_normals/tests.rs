@@ -91,7 +91,8 @@ fn a_plane_has_the_scallops_of_the_closed_form_whatever_the_spacing() {
     }
 }
 
-/// Passes half a mm apart, and a border 0.2 mm beside the last one, by places half an interval and more apart.
+/// Passes half a mm apart, and a border 0.2 mm beside the last one, by places half an interval and more
+/// apart.
 #[test]
 fn a_look_at_ridges_alone_finds_their_heights_and_what_stands_along_borders() {
     let (part, path) = (plane([4.0, 3.2]), path(&passes(0.0)));
@@ -219,8 +220,8 @@ fn what_was_never_cut_stands_as_high_as_the_stock() {
     }
 }
 
-/// A ball beside the upper border of a slope, as deep below it as it is wide, cuts the edge by micrometres. The way down along the
-/// slope's normal leads out over the border, where the ball has cut all.
+/// A ball beside the upper border of a slope, as deep below it as it is wide, cuts the edge by micrometres.
+/// The way down along the slope's normal leads out over the border, where the ball has cut all.
 #[test]
 fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
     let corners = [[0.0, 0.0, 0.0], [0.0, 3.0, -3.0], [1.0, 0.0, 0.0], [1.0, 3.0, -3.0]].map(Point3::from);
@@ -249,8 +250,9 @@ fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
     }
 }
 
-/// A wall, the ground that falls from its crest, and walls at both ends of it, cut as deep as the ground lies below its passes: the way inward
-/// from the crest leads out over the ground, and at the corners from ridge to ridge over a third face.
+/// A wall, the ground that falls from its crest, and walls at both ends of it, cut as deep as the ground lies
+/// below its passes: the way inward from the crest leads out over the ground, and at the corners from ridge
+/// to ridge over a third face.
 #[test]
 fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower() {
     let (fall, low) = (0.45, -4.0);
@@ -282,7 +284,8 @@ fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower
     }
 }
 
-/// A ball that dips into the corner of a block: lines along the walls, and along the middle of both walls, graze what it took of the top.
+/// A ball that dips into the corner of a block: lines along the walls, and along the middle of both walls,
+/// graze what it took of the top.
 #[test]
 fn a_corner_is_cut_as_deep_as_it_is_lower() {
     let (deep, low) = (3e-4, -4.0);
@@ -323,8 +326,8 @@ fn a_corner_is_cut_as_deep_as_it_is_lower() {
     }
 }
 
-/// Along the foot of a wall, a mm before it, a flat end cuts the floor: lines along the wall's normal graze what was cut, so that its slope
-/// says nothing.
+/// Along the foot of a wall, a mm before it, a flat end cuts the floor: lines along the wall's normal graze
+/// what was cut, so that its slope says nothing.
 #[test]
 fn a_wall_that_nothing_comes_near_to_is_not_gouged() {
     let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 0.0, 2.0], [0.0, 0.0, 2.0]].map(Point3::from);
@@ -492,8 +495,9 @@ impl AlongNormal for Counted<'_> {
     }
 }
 
-/// Ridges told by the two moves that meet stand where looks along all moves find them, and take one such look each. On a dome, leaning
-/// forth and back, some passes deeper, so that they leave nothing of their neighbours between them.
+/// Ridges told by the two moves that meet stand where looks along all moves find them, and take one such look
+/// each. On a dome, leaning forth and back, some passes deeper, so that they leave nothing of their
+/// neighbours between them.
 #[test]
 fn the_two_moves_that_meet_tell_the_ridges_that_all_moves_do() {
     let rho = 6.0;

@@ -7,7 +7,8 @@ use crate::facing::Judged;
 /// A share of this much is told as all of it: areas are sums of triangles.
 const ALL: f64 = 1.0 - 1e-9;
 
-/// Areas of the part's surface. They are a partition: measured and not judged sum up to the whole. Lengths in mm.
+/// Areas of the part's surface. They are a partition: measured and not judged sum up to the whole. Lengths in
+/// mm.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct CoverageFigures {
     /// What was to be judged.
@@ -32,8 +33,8 @@ pub struct CoverageFigures {
     pub hidden_mm2: f64,
     /// Not judged: what lies outside of the block.
     pub outside_stock_mm2: f64,
-    /// Not judged: floor and walls of a pocket where the cutter does not fit or only its round corner comes, and a hair of floor beside
-    /// the walls.
+    /// Not judged: floor and walls of a pocket where the cutter does not fit or only its round corner comes,
+    /// and a hair of floor beside the walls.
     pub out_of_reach_mm2: f64,
     /// Bound of the error of each area.
     pub error_bound_mm2: f64,
@@ -42,7 +43,8 @@ pub struct CoverageFigures {
 }
 
 impl CoverageFigures {
-    /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all of it, mm².
+    /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all
+    /// of it, mm².
     pub fn of_pocket(judge: Judged, [floor, whole_floor]: [f64; 2], [walls, all_walls]: [f64; 2]) -> Self {
         let out_of_reach_mm2 = (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0);
         Self { judge, by_cells_mm2: floor, by_moves_mm2: walls, out_of_reach_mm2, ..Self::default() }.summed()
@@ -73,8 +75,8 @@ impl CoverageFigures {
         if self.surface_mm2 > 0.0 { self.judged_mm2 / self.surface_mm2 } else { 0.0 }
     }
 
-    /// `on 31 % of the surface; not judged: walls 1500 mm², facing away 1200 mm²`, to stand behind a verdict; empty where it
-    /// covers all.
+    /// `on 31 % of the surface; not judged: walls 1500 mm², facing away 1200 mm²`, to stand behind a verdict;
+    /// empty where it covers all.
     fn words(&self) -> String {
         if self.share() >= ALL {
             return String::new();

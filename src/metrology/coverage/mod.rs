@@ -1,15 +1,17 @@
 //! How much of a part's surface a verdict covers, and what of it cells cannot see.
 //!
-//! Enters: the part, what its tool can face, and the cells that were measured. Leaves: the area of each kind of surface, a
-//! partition of the whole, and the figures along the normals of what is judged and no cell measures. mm, mm².
+//! Enters: the part, what its tool can face, and the cells that were measured. Leaves: the area of each kind
+//! of surface, a partition of the whole, and the figures along the normals of what is judged and no cell
+//! measures. mm, mm².
 //!
-//! A cell measures a place where the surface is not steeper than [`STEEP`] and where the centre of one of the nine cells
-//! around sees the same sheet of it. All other judged surface is measured along its normals: steep faces, narrow ledges, and, where
-//! the whole surface is judged, walls, undersides, and floors below other surface. What was never cut stands there as far as the
-//! block reaches; the tool's reach is a lower bound of it.
+//! A cell measures a place where the surface is not steeper than [`STEEP`] and where the centre of one of the
+//! nine cells around sees the same sheet of it. All other judged surface is measured along its normals: steep
+//! faces, narrow ledges, and, where the whole surface is judged, walls, undersides, and floors below other
+//! surface. What was never cut stands there as far as the block reaches; the tool's reach is a lower bound of
+//! it.
 //!
-//! Areas are sums over small triangles, each of the kind of its middle. The area of all those whose corners are of
-//! another kind is the bound of the error.
+//! Areas are sums over small triangles, each of the kind of its middle. The area of all those whose corners
+//! are of another kind is the bound of the error.
 
 mod figures;
 mod near;
@@ -32,8 +34,8 @@ use part::{Part, Patch, SurfacePoint};
 use pieces::{Pieces, divided, join};
 use unseen_cut::{UnseenCut, lowest_of_tools};
 
-/// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
-/// too far to see what one pass leaves.
+/// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface
+/// as in the plan: too far to see what one pass leaves.
 pub(crate) const STEEP: f64 = 0.2;
 
 /// A cell's centre sees the sheet of a place where it lies within this slope from the place's tangent plane.
@@ -45,16 +47,17 @@ const SAME_NORMAL: f64 = 1e-9;
 /// Triangles in a square of the longest side that is allowed, about: they are halved until no side is longer.
 const TRIANGLES_A_SQUARE: f64 = 3.0;
 
-/// Triangles that a part without small facets is divided into. Fewer leave wide bounds of the areas; each takes some µs.
+/// Triangles that a part without small facets is divided into. Fewer leave wide bounds of the areas; each
+/// takes some µs.
 const PIECES: f64 = 6_000.0;
 
-/// Triangles along normals for each hundred cells, and at least so many: rays cost far more than cells, and must not cost a run
-/// more than a third.
+/// Triangles along normals for each hundred cells, and at least so many: rays cost far more than cells, and
+/// must not cost a run more than a third.
 const TRIANGLES_A_HUNDRED_CELLS: f64 = 3.0;
 const LEAST_TRIANGLES: f64 = 4_000.0;
 
-/// Contacts of moves are looked at once in cubes of this share of the triangles' sides. A smaller share asks the same place for
-/// every chord of a pass; a greater one misses passes between passes.
+/// Contacts of moves are looked at once in cubes of this share of the triangles' sides. A smaller share asks
+/// the same place for every chord of a pass; a greater one misses passes between passes.
 const CONTACT_SHARE: f64 = 0.25;
 
 /// What cells measured.
@@ -175,7 +178,8 @@ impl<'a> Coverage<'a> {
         .summed()
     }
 
-    /// Measures what is judged and no cell measures; `None` where there is no such surface. Also the distance of the places, mm.
+    /// Measures what is judged and no cell measures; `None` where there is no such surface. Also the distance
+    /// of the places, mm.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -219,7 +223,8 @@ impl<'a> Coverage<'a> {
     fn are_unseen(&self, places: &[NetPlace]) -> Vec<bool> {
         let kinds = self.facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
         let seen = |k: usize| self.measured_by(kinds[k], &places[k]) != By::Normals;
-        // A contact on an edge of a mesh has a normal between those of its facets, which are measured beside it.
+        // A contact on an edge of a mesh has a normal between those of its facets, which are measured beside
+        // it.
         let on_facet = |k: usize| match places[k].site {
             Site::Facet { triangle, .. } => {
                 self.part.mesh().normal(triangle as usize).dot(&places[k].normal) > 1.0 - SAME_NORMAL

@@ -1,7 +1,7 @@
 //! The surface of a part in small triangles, each with its area and the place in its middle.
 //!
-//! Enters: the part and a distance. Leaves: triangles no side of which is longer than about that, on facets exactly and on
-//! patches in their parameters, that together are the whole surface. mm, mm².
+//! Enters: the part and a distance. Leaves: triangles no side of which is longer than about that, on facets
+//! exactly and on patches in their parameters, that together are the whole surface. mm, mm².
 
 use std::collections::HashMap;
 use std::ops::Range;

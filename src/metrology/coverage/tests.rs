@@ -8,7 +8,8 @@ use work::monitor::Silent;
 
 const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 
-/// A profile in the (x, z) plane, counterclockwise seen from −y, extruded by `length` along y; `caps` are its triangles.
+/// A profile in the (x, z) plane, counterclockwise seen from −y, extruded by `length` along y; `caps` are its
+/// triangles.
 fn prism(profile: &[[f64; 2]], length: f64, caps: &[[u32; 3]]) -> Part {
     let n = profile.len() as u32;
     let at = |y: f64| profile.iter().map(move |[x, z]| Point3::new(*x, y, *z));
@@ -35,7 +36,8 @@ fn tee() -> Part {
     prism(&profile, 30.0, &[[0, 1, 2], [0, 2, 7], [7, 2, 5], [7, 5, 6], [2, 4, 5], [2, 3, 4]])
 }
 
-/// An L: a floor 20 wide and 5 high that runs under a lid from x = 12 to 30, z = 9 to 12, held by a wall from 20 to 30.
+/// An L: a floor 20 wide and 5 high that runs under a lid from x = 12 to 30, z = 9 to 12, held by a wall from
+/// 20 to 30.
 fn lidded() -> Part {
     let profile = [
         [0.0, 0.0],
@@ -222,7 +224,8 @@ fn places_half_as_far_apart_tell_more() {
     assert!(off[1] < off[0] && off[1] < 0.05, "{off:?}");
 }
 
-/// A ball goes 0.02 mm too deep into the wall at y = 0, then a flat 0.05 mm into that at y = 10: both are found with their moves.
+/// A ball goes 0.02 mm too deep into the wall at y = 0, then a flat 0.05 mm into that at y = 10: both are
+/// found with their moves.
 #[test]
 fn each_of_several_tools_cuts_the_walls_that_it_passes() {
     let tips =

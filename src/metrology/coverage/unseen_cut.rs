@@ -1,9 +1,10 @@
 //! The cut along the normals of surface that no cell sees.
 //!
-//! It differs from the cut along any normal in two ways. What lies beyond the sides of the block was never there. And a cut
-//! beside a convex edge belongs to the surface that is nearest to it: a pass that dips a nanometre into a level top cuts the
-//! uppermost line of the wall below as far as its arc is wide. On the medial axis, where the cut is as far from the top as from the
-//! wall, the top's own normal meets it as deep or deeper; so where cells measure that top, the wall has no share in it.
+//! It differs from the cut along any normal in two ways. What lies beyond the sides of the block was never
+//! there. And a cut beside a convex edge belongs to the surface that is nearest to it: a pass that dips a
+//! nanometre into a level top cuts the uppermost line of the wall below as far as its arc is wide. On the
+//! medial axis, where the cut is as far from the top as from the wall, the top's own normal meets it as deep
+//! or deeper; so where cells measure that top, the wall has no share in it.
 
 use geometry::{Point3, Vector3};
 
@@ -19,12 +20,13 @@ use crate::figures::NUMERICAL_FLOOR;
 const BEYOND: f64 = 1e-2;
 const BEYOND_MM: f64 = 1e-5;
 
-/// Places nearer than about this to a convex edge are at the edge, mm. A greater one hides how cuts change beside edges;
-/// with a lesser one rays along the edge graze every pass over it, which takes as long as all others.
+/// Places nearer than about this to a convex edge are at the edge, mm. A greater one hides how cuts change
+/// beside edges; with a lesser one rays along the edge graze every pass over it, which takes as long as all
+/// others.
 const AT_EDGE: f64 = 1e-3;
 
-/// How often what surrounds a place where nothing was cut is divided. Each takes four times the lines, and has a quarter of what moves rise
-/// by aside.
+/// How often what surrounds a place where nothing was cut is divided. Each takes four times the lines, and
+/// has a quarter of what moves rise by aside.
 const DIVISIONS: u32 = 2;
 
 /// The cosine between normals of one face so near to each other.
@@ -57,7 +59,8 @@ impl UnseenCut<'_> {
         fits < AT_EDGE && self.is_level_beyond(point, normal, fits)
     }
 
-    /// Whether cells measure the surface on the other side of the medial axis, which is `fits` mm below a place.
+    /// Whether cells measure the surface on the other side of the medial axis, which is `fits` mm below a
+    /// place.
     fn is_level_beyond(&self, point: &Point3, normal: &Vector3, fits: f64) -> bool {
         let beyond = point - normal * (fits * (1.0 + BEYOND) + BEYOND_MM);
         let other = self.cut.part.closest_point(&beyond).0;
@@ -78,9 +81,9 @@ impl UnseenCut<'_> {
         Some(NormalHit { deviation: 0.0, normal: *normal, way: Way::Normal, ..capped })
     }
 
-    /// How high all places of a square, `aside` mm to each side along the surface, are left at most; infinite where the move over its
-    /// middle does not pass over all of it. What one move leaves is a convex function: it is greatest at a corner. The square is divided
-    /// so often.
+    /// How high all places of a square, `aside` mm to each side along the surface, are left at most; infinite
+    /// where the move over its middle does not pass over all of it. What one move leaves is a convex
+    /// function: it is greatest at a corner. The square is divided so often.
     fn left_within(&self, point: &Point3, normal: &Vector3, aside: f64, divisions: u32) -> f64 {
         let Some(hit) = self.cut.hit(point, normal, None) else { return f64::INFINITY };
         let Some(along) = normal.cross(&normal.yzx()).try_normalize(1e-9) else { return f64::INFINITY };

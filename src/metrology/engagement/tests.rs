@@ -120,7 +120,8 @@ fn rings_follow_the_law_of_cosines() {
     // The circumference crosses the border of what the first ring cleared at this angle from the way out.
     let out = ((cleared * cleared - rho * rho - RADIUS * RADIUS) / (2.0 * rho * RADIUS)).acos();
     for k in 500..700 {
-        // A chord's heading is off the circle's by half its angle, its middle nearer to the centre by its rise.
+        // A chord's heading is off the circle's by half its angle, its middle nearer to the centre by its
+        // rise.
         let (chord, found) = (TAU / 400.0, found.of_moves[k]);
         assert!((found - out).abs() <= chord, "{found} {out}");
     }
@@ -182,8 +183,8 @@ impl Angle for Vector2 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Ways at random, short and long, with sharp turns: no place of any move exceeds its bound by brute force, and the
-    /// greatest of all is what was found, within the bound.
+    /// Ways at random, short and long, with sharp turns: no place of any move exceeds its bound by brute
+    /// force, and the greatest of all is what was found, within the bound.
     #[test]
     fn the_angles_are_those_of_brute_force(
         steps in prop::collection::vec((-3.2f64..3.2, prop_oneof![0.02f64..0.4, 0.4f64..6.0]), 3..14),
@@ -214,8 +215,9 @@ proptest! {
     }
 }
 
-/// A way into ground that was cleared before, and beside it: as closed forms say, and as brute force over the circumference, films
-/// included, in a region with corners and an island; below its floor nothing was cleared.
+/// A way into ground that was cleared before, and beside it: as closed forms say, and as brute force over the
+/// circumference, films included, in a region with corners and an island; below its floor nothing was
+/// cleared.
 #[test]
 fn ground_cleared_before_is_no_stock() {
     let ring = |c: &[(f64, f64)]| c.iter().map(|&(x, y)| Point2::new(x, y)).collect::<Vec<_>>();
@@ -234,7 +236,8 @@ fn ground_cleared_before_is_no_stock() {
     }
     let lower = Stock::milled(block(), &region, -1.9);
     assert!((arcs_in(&lower, &through(&[(20.0, 4.0), (25.0, 4.0)])).of_moves[1] - PI).abs() < 1e-9);
-    // The greatest angle on short moves, each by itself, against places 0.01 degrees apart on the circumference.
+    // The greatest angle on short moves, each by itself, against places 0.01 degrees apart on the
+    // circumference.
     for (k, at) in [(4.0, 3.0), (9.0, 9.5), (13.0, 15.0), (24.0, 5.0), (1.0, 6.0), (9.5, 5.0), (31.0, 10.0)]
         .iter()
         .enumerate()

@@ -13,14 +13,14 @@ use crate::closer::BYTES_PER_SQUARE;
 /// Bytes in a MiB.
 pub const MIB: u64 = 1 << 20;
 
-/// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
-/// every cell has one, the mesh of the surface and height.exr the rest. Too small a figure lets a run exhaust the machine
-/// that the scene's `memory_mib` promised to spare; too great a one refuses grids that would fit.
+/// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where every
+/// cell has one, the mesh of the surface and height.exr the rest. Too small a figure lets a run exhaust the
+/// machine that the scene's `memory_mib` promised to spare; too great a one refuses grids that would fit.
 const BYTES_PER_CELL: usize = 80;
 
-/// Bytes a triangle of the part at a run's peak: its corners, neighbours and search tree, and what drops the cutter on it.
-/// Reading the file takes half of that. Too small a figure lets a run exhaust the machine; too great a one refuses meshes
-/// that would fit.
+/// Bytes a triangle of the part at a run's peak: its corners, neighbours and search tree, and what drops the
+/// cutter on it. Reading the file takes half of that. Too small a figure lets a run exhaust the machine; too
+/// great a one refuses meshes that would fit.
 pub const BYTES_PER_TRIANGLE: u64 = 780;
 
 /// Bytes a cell that was measured: stock, winning move, deviation, ridges.
@@ -127,8 +127,9 @@ impl Budget {
         (self.left(moves) as usize / BYTES_PER_CELL).saturating_sub(grid.len())
     }
 
-    /// The grid over `area` before any toolpath is known: a share of the memory is kept for those. With it a note where the
-    /// automatic cell had to grow to fit into the memory; a cell that the user chose is never changed.
+    /// The grid over `area` before any toolpath is known: a share of the memory is kept for those. With it a
+    /// note where the automatic cell had to grow to fit into the memory; a cell that the user chose is never
+    /// changed.
     ///
     /// # Errors
     /// [`GridError`] when the grid does not fit.

@@ -1,7 +1,7 @@
 //! The engines: each cuts a path out of the stock and measures what is left against the part.
 //!
-//! Enters: a [`Task`], mm. Leaves: a [`Measurement`] with its bounds, and the [`View`] that figures and pictures are drawn
-//! from. A new engine is one file here and one line in [`ENGINES`].
+//! Enters: a [`Task`], mm. Leaves: a [`Measurement`] with its bounds, and the [`View`] that figures and
+//! pictures are drawn from. A new engine is one file here and one line in [`ENGINES`].
 
 mod budget;
 mod cells;
@@ -43,8 +43,9 @@ pub trait Engine: Sync {
     fn ridges(&self, _task: &Task<'_>, _monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         Ok(None)
     }
-    /// Cuts on the same cells, and finds places above the scallop limit beside those that [`Engine::ridges`] finds, each with the height
-    /// that it may have at most. Nothing where that takes as long as measuring all.
+    /// Cuts on the same cells, and finds places above the scallop limit beside those that [`Engine::ridges`]
+    /// finds, each with the height that it may have at most. Nothing where that takes as long as measuring
+    /// all.
     ///
     /// # Errors
     /// [`EngineError`].

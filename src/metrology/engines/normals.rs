@@ -15,8 +15,8 @@ use crate::{
     FirstCut, RaysCut, RidgeMap, SweptVolume, VoxelCut, measure_along_normals, net_places, path_figures,
 };
 
-/// Bytes a place of the net: place, hit, triangles with their crossings, and the map; and the map of the measurement before,
-/// which stays until this one is known to be better.
+/// Bytes a place of the net: place, hit, triangles with their crossings, and the map; and the map of the
+/// measurement before, which stays until this one is known to be better.
 const BYTES_PER_PLACE: u64 = 800;
 
 /// Distance of the places over that of cells where the program chooses: three places from pass to pass.
@@ -25,8 +25,8 @@ const PLACES_OVER_CELLS: f64 = 2.0;
 /// Places from pass to pass while only ridges are measured: these are found between places.
 const PLACES_A_PASS: f64 = 2.0;
 
-/// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
-/// far below it as that radius, so that the far side of a thin part counts for nothing.
+/// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's
+/// radius; cuts as far below it as that radius, so that the far side of a thin part counts for nothing.
 pub const REACH_OVER_UNCUT: f64 = 4.0;
 
 /// By how much space for voxels is larger than it need be, mm: then none of its own surface is met.

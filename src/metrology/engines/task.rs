@@ -86,7 +86,8 @@ impl<'a> Task<'a> {
             && self.part.patches().is_empty()
     }
 
-    /// The moves that memory is reckoned for: those of several tools are held again, each tool's as a path of its own.
+    /// The moves that memory is reckoned for: those of several tools are held again, each tool's as a path of
+    /// its own.
     pub fn moves_held(&self) -> usize {
         if self.cutters.are_several() { 2 * self.path.len() } else { self.path.len() }
     }

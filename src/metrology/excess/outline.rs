@@ -1,7 +1,8 @@
 //! What a triangle of the part covers of a square of the plan.
 //!
-//! Where a patch ends, its triangles end at chords of its border. What they stand for there ends at the border itself: at a chord
-//! of the stretch within the square, moved out by what the border leaves that chord by, which falls with the square's size.
+//! Where a patch ends, its triangles end at chords of its border. What they stand for there ends at the
+//! border itself: at a chord of the stretch within the square, moved out by what the border leaves that chord
+//! by, which falls with the square's size.
 
 use geometry::{Point2, Point3, Vector2};
 use part::{Part, PatchPoint};
@@ -84,7 +85,8 @@ impl Rim<'_> {
         [self.apex, self.apex + (a - self.apex) * scale, self.apex + (b - self.apex) * scale]
     }
 
-    /// The shares of the border that lie behind some places, as seen from the apex; `None` where the triangle stands upright.
+    /// The shares of the border that lie behind some places, as seen from the apex; `None` where the triangle
+    /// stands upright.
     fn stretch(&self, places: &[Point2]) -> Option<[f64; 2]> {
         let [a, b] = self.chord.map(|end| end - self.apex);
         let length = (b - a).norm();
@@ -114,8 +116,8 @@ fn outward(from: &Point2, [a, b]: [Point2; 2]) -> Vector2 {
     across.try_normalize(0.0).unwrap_or_default()
 }
 
-/// Whether a triangle reaches into a square of the plan: no side of either has all of the other beyond it. Boxes of long
-/// triangles askew hold many squares that these do not meet.
+/// Whether a triangle reaches into a square of the plan: no side of either has all of the other beyond it.
+/// Boxes of long triangles askew hold many squares that these do not meet.
 pub(super) fn overlaps(triangle: &[Point3; 3], centre: Point2, half: f64) -> bool {
     let [a, b, c] = triangle.map(|p| p.xy() - centre);
     let within = |x: [f64; 3]| x.iter().any(|x| *x <= half) && x.iter().any(|x| *x >= -half);

@@ -16,7 +16,8 @@ use sim::NOT_CUT;
 /// Triangles of the part that are looked at in one square. One with more of them is divided unseen.
 const MOST_TRIANGLES: usize = 48;
 
-/// Moves that are weighed, the lowest in the middle. With fewer, places where several passes meet take more divisions.
+/// Moves that are weighed, the lowest in the middle. With fewer, places where several passes meet take more
+/// divisions.
 const MOST_MOVES: usize = 5;
 
 /// Moves that are followed along a path to the lowest one. Cells show one of so many short ones.
@@ -25,7 +26,8 @@ const MOST_BESIDE: usize = 16;
 /// Heights that differ by less, mm, are one level.
 const LEVEL: f64 = 1e-9;
 
-/// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of thousands of squares.
+/// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of
+/// thousands of squares.
 const MOST_ASKED: usize = 4096;
 
 /// Moves that are found to have cut away what seems to stand on a place, one after the other.
@@ -34,7 +36,8 @@ const MOST_ON_THE_WAY: usize = 8;
 /// Of these the lowest are asked whether they pass all of a square.
 const MOST_LOW: usize = 64;
 
-/// Heights above a wall's, in sizes of the square along the normal, that are looked at for free space beyond it.
+/// Heights above a wall's, in sizes of the square along the normal, that are looked at for free space beyond
+/// it.
 const BEYOND_WALL: [f64; 3] = [2.0, 8.0, 32.0];
 
 /// Normals that lean less, by their part in the plan, lead over walls too late.
@@ -43,8 +46,8 @@ const LEAST_ASIDE: f64 = 1e-3;
 /// What may rise by so many times the size of a square is no slope: a wall stands there, or a foil.
 pub(super) const STEEPEST: f64 = 100.0;
 
-/// Patches are measured elsewhere where they are steeper than faces of meshes that are, by this: what is measured elsewhere is told by the
-/// middles of small triangles.
+/// Patches are measured elsewhere where they are steeper than faces of meshes that are, by this: what is
+/// measured elsewhere is told by the middles of small triangles.
 const STEEP_PATCH_SHARE: f64 = 0.75;
 
 /// In squares with half sides below this share of a cell all triangles are looked at.
@@ -53,18 +56,19 @@ const CORNER_SHARE: f64 = 1.0 / 256.0;
 /// How often a greater height is assumed.
 const MOST_REACHES: usize = 6;
 
-/// How often a height that is enough is lowered to what it leaves. Each time the rest shrinks by the slope of the design
-/// times that of the cut.
+/// How often a height that is enough is lowered to what it leaves. Each time the rest shrinks by the slope of
+/// the design times that of the cut.
 const MOST_LOWERED: usize = 4;
 
 /// Lowering ends where it gains less than this share of what stands over the place looked at.
 const LITTLE_GAIN: f64 = 0.1;
 
-/// Between its corners a smooth surface may leave a tangent plane, and its normals turn, by so many times as much as there.
+/// Between its corners a smooth surface may leave a tangent plane, and its normals turn, by so many times as
+/// much as there.
 const BETWEEN_CORNERS: f64 = 1.25;
 
-/// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil that is no material. Squares
-/// with half sides below this, mm, tell the foil from the rest.
+/// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil
+/// that is no material. Squares with half sides below this, mm, tell the foil from the rest.
 pub(super) const LEAST_HALF: f64 = ROUNDING;
 
 /// What a square holds.
@@ -90,7 +94,8 @@ pub(super) enum Held {
 struct Clipped {
     corners: [Point2; MOST_CORNERS],
     len: usize,
-    /// Plan parts of the design's normals at the corners, moved away from the middle by what normals between them may turn more.
+    /// Plan parts of the design's normals at the corners, moved away from the middle by what normals between
+    /// them may turn more.
     leans: [Vector2; MOST_CORNERS],
     /// On the design, within the polygon.
     foot: SurfacePoint,
@@ -153,8 +158,8 @@ impl Patches<'_> {
         (self.stock_top - self.inspection.part.bounds().min.z).max(0.0)
     }
 
-    /// True where the cutter fits, and what stands is no higher than what may be uncut, or the pass that cut came down to the
-    /// design nearby.
+    /// True where the cutter fits, and what stands is no higher than what may be uncut, or the pass that cut
+    /// came down to the design nearby.
     pub fn reached(&self, at: Point2, height: f64, by: u32) -> bool {
         let Inspection { part, cutters, surface, limits, .. } = *self.inspection;
         let Some(design) = part.highest_at(at.x, at.y) else { return false };
@@ -283,9 +288,9 @@ impl Patches<'_> {
         has_area(&corners[..len]).then_some(Outline { corners, len, is_at_end })
     }
 
-    /// What stands above a piece of a square at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
-    /// All moves are asked where those that cells show tell nothing, or where another one cut what they leave, and in a `small` square where
-    /// they leave a wall.
+    /// What stands above a piece of a square at most, and what stands on its foot, cut by which move; `None`
+    /// where that cannot be told. All moves are asked where those that cells show tell nothing, or where
+    /// another one cut what they leave, and in a `small` square where they leave a wall.
     fn above(&self, piece: &Clipped, half: f64, small: bool) -> Option<(f64, f64, u32)> {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let hidden = self.hidden(point, normal);
@@ -302,7 +307,8 @@ impl Patches<'_> {
         [shown, by_all].into_iter().flatten().reduce(least)
     }
 
-    /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where there are too many to ask.
+    /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where
+    /// there are too many to ask.
     fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
         let every_move = self.inspection.every_move?;
         let place = (foot.point + foot.normal * height).xy();
@@ -314,8 +320,8 @@ impl Patches<'_> {
         here.max(self.least).max(0.0) + STEEPEST * half
     }
 
-    /// Of all moves the lowest over the foot of a piece that rose to a height, and the lowest of those that pass all of it; `None` where
-    /// there are too many to ask.
+    /// Of all moves the lowest over the foot of a piece that rose to a height, and the lowest of those that
+    /// pass all of it; `None` where there are too many to ask.
     fn lowest_of_all(&self, piece: &Clipped, height: f64) -> Option<Vec<u32>> {
         let envelope = &self.inspection.surface.envelope;
         let q = piece.foot.point.xy() + piece.foot.normal.xy() * height;
@@ -343,8 +349,8 @@ impl Patches<'_> {
         Some(low.first().map(|low| low.1).into_iter().chain(passing).collect())
     }
 
-    /// As [`Self::above`], by the moves that cells show and some `hidden` ones; where the lowest of all moves over the foot are told, by
-    /// all.
+    /// As [`Self::above`], by the moves that cells show and some `hidden` ones; where the lowest of all moves
+    /// over the foot are told, by all.
     fn above_with(
         &self,
         piece: &Clipped,
@@ -420,8 +426,8 @@ impl Patches<'_> {
         None
     }
 
-    /// The rim of a flat leaves a wall, across which no move bounds a square: what is free just beyond it, along all normals of the
-    /// square, bounds what stands below; `None` where none is found.
+    /// The rim of a flat leaves a wall, across which no move bounds a square: what is free just beyond it,
+    /// along all normals of the square, bounds what stands below; `None` where none is found.
     fn beside_wall(&self, piece: &Clipped, half: f64, known: f64, hidden: &[u32], all: bool) -> Option<f64> {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let aside = normal.xy().norm().max(LEAST_ASIDE);
@@ -434,8 +440,8 @@ impl Patches<'_> {
         })
     }
 
-    /// Moves that no cell may show: those that were found so far, and where passes are nearer to each other than cells, those
-    /// that touch the design nearby.
+    /// Moves that no cell may show: those that were found so far, and where passes are nearer to each other
+    /// than cells, those that touch the design nearby.
     fn hidden(&self, point: &Point3, normal: &Vector3) -> Cow<'_, [u32]> {
         let Inspection { surface, .. } = *self.inspection;
         let (i, j) = surface.cut.grid.nearest_cell(point.x, point.y);
@@ -447,8 +453,8 @@ impl Patches<'_> {
         Cow::Borrowed(self.unseen)
     }
 
-    /// Moves that no cell may show and that are lower over a point than one that cells show: from each of these, along the path as far
-    /// as it leads down.
+    /// Moves that no cell may show and that are lower over a point than one that cells show: from each of
+    /// these, along the path as far as it leads down.
     fn beside(&self, point: &Point3, hidden: &[u32]) -> Vec<u32> {
         let CutSurface { envelope, path, .. } = self.inspection.surface;
         let (i, j) = self.inspection.grid.nearest_cell(point.x, point.y);
@@ -473,8 +479,9 @@ impl Patches<'_> {
         found
     }
 
-    /// Of all moves that are lowest over a point the one whose axis is nearest in the plan; `None` where there are too many to ask. Of many
-    /// short moves on one level, the first that came over the centre of a cell may end beside it.
+    /// Of all moves that are lowest over a point the one whose axis is nearest in the plan; `None` where
+    /// there are too many to ask. Of many short moves on one level, the first that came over the centre of a
+    /// cell may end beside it.
     fn nearest_of_lowest(&self, point: &Point3) -> Option<u32> {
         let envelope = &self.inspection.surface.envelope;
         let all = self.inspection.every_move?.over(point.xy());
@@ -528,8 +535,8 @@ impl Patches<'_> {
         low.into_iter().map(|m| m.1).collect()
     }
 
-    /// Height of the cut above the piece, along its normals, at most: where the polygon comes to when it rises from one height to the
-    /// other, each corner along its own normal.
+    /// Height of the cut above the piece, along its normals, at most: where the polygon comes to when it
+    /// rises from one height to the other, each corner along its own normal.
     fn over(&self, piece: &Clipped, moves: &[u32], heights: [f64; 2]) -> f64 {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let mut places = [Point2::origin(); 2 * MOST_CORNERS];
@@ -607,8 +614,8 @@ impl Clipped {
     }
 }
 
-/// What is left of a bound that is enough: nothing stands higher, so heights up to it are all that need be looked at, and what
-/// stands over those is a bound, too. `known` is what stands there at least.
+/// What is left of a bound that is enough: nothing stands higher, so heights up to it are all that need be
+/// looked at, and what stands over those is a bound, too. `known` is what stands there at least.
 fn lowered(mut possible: f64, known: f64, over: &dyn Fn(f64) -> f64) -> f64 {
     for _ in 0..MOST_LOWERED {
         let before = possible;
@@ -620,8 +627,8 @@ fn lowered(mut possible: f64, known: f64, over: &dyn Fn(f64) -> f64) -> f64 {
     possible
 }
 
-/// The least, over all weights of the rows, of the greatest of `count` columns in their mean; a little more where the
-/// search stops early. Every mean of rows gives an upper bound of the least row's greatest column.
+/// The least, over all weights of the rows, of the greatest of `count` columns in their mean; a little more
+/// where the search stops early. Every mean of rows gives an upper bound of the least row's greatest column.
 pub(super) fn least_greatest<const N: usize>(rows: &[[f64; N]], count: usize) -> f64 {
     /// Rows that are mixed in, one after the other.
     const ROUNDS: usize = 6;
@@ -642,8 +649,8 @@ pub(super) fn least_greatest<const N: usize>(rows: &[[f64; N]], count: usize) ->
     best
 }
 
-/// The share of `b` in a mean with `a` that makes its greatest column least, and that column: a convex function of the
-/// share, made of straight lines.
+/// The share of `b` in a mean with `a` that makes its greatest column least, and that column: a convex
+/// function of the share, made of straight lines.
 fn mix<const N: usize>(a: &[f64; N], b: &[f64; N], count: usize) -> (f64, f64) {
     let line = |share: f64| {
         let at = |k: usize| a[k] + share * (b[k] - a[k]);

@@ -53,7 +53,8 @@ fn roof() -> Part {
     Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0)
 }
 
-/// Passes of a cutter that touch the part, or stay over it by `lift`, at an angle to x, from beyond the part to beyond it.
+/// Passes of a cutter that touch the part, or stay over it by `lift`, at an angle to x, from beyond the part
+/// to beyond it.
 fn path(part: &Part, cutter: &Cutter, angle: f64, step: f64, lift: f64) -> Toolpath {
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let middle = Point2::new(0.5 * SIDE, 0.5 * SIDE);
@@ -155,8 +156,8 @@ impl<'a> Brute<'a> {
         work::parallel::map(places + 1, of_row).into_iter().fold(0.0, f64::max)
     }
 
-    /// Whether nothing of the `truth` stands above figure and bound, and the figure is what stands at its place: on a crest along one of
-    /// the normals between those beside it.
+    /// Whether nothing of the `truth` stands above figure and bound, and the figure is what stands at its
+    /// place: on a crest along one of the normals between those beside it.
     fn confirms(&self, found: &Bounded, truth: f64) -> bool {
         let Some(at) = found.at_mm.map(Point3::from) else {
             return truth.max(found.max_mm) <= found.error_bound_mm + 1e-9;
@@ -205,8 +206,8 @@ fn holds(
     Ok(())
 }
 
-/// Ridges that come near the limit everywhere are told from it though few squares can be held: what may stand above it is looked at
-/// closer while it is collected.
+/// Ridges that come near the limit everywhere are told from it though few squares can be held: what may stand
+/// above it is looked at closer while it is collected.
 #[test]
 fn few_squares_are_enough_where_all_ridges_hold() {
     let (part, cutter) = (part(4), Cutter::ball(6.0).unwrap());
@@ -215,7 +216,8 @@ fn few_squares_are_enough_where_all_ridges_hold() {
     assert!(found.max_mm > 0.0094 && found.at_most() < LIMITS.scallop, "{found:?}");
 }
 
-/// Passes over half of a part. What stands on the other half fails for certain, and its bound holds; so does that of what the passes left.
+/// Passes over half of a part. What stands on the other half fails for certain, and its bound holds; so does
+/// that of what the passes left.
 #[test]
 fn what_no_pass_came_to_is_higher_than_its_limit_for_certain() {
     let cutter = Cutter::ball(6.0).unwrap();
@@ -239,19 +241,22 @@ fn what_leans_over_the_border_from_beyond_does_not_count() {
     holds(1, 0, 1.729461721076573, 0.9134534938493454, 0.0, 0.04).unwrap();
 }
 
-/// The place that stands above a corner of a square lies aside by the normal there, not by the one in the middle.
+/// The place that stands above a corner of a square lies aside by the normal there, not by the one in the
+/// middle.
 #[test]
 fn normals_that_turn_within_a_square_are_bounded() {
     holds(2, 1, 2.9463434509808835, 1.0726896715766943, 0.04652898462678416, 0.5).unwrap();
 }
 
-/// Between cells a move may take off a ridge that is hardly higher than the numerical floor. Then none is told.
+/// Between cells a move may take off a ridge that is hardly higher than the numerical floor. Then none is
+/// told.
 #[test]
 fn ridges_of_nanometres_that_a_move_takes_off_are_not_told() {
     holds(0, 1, 2.2443622065546873, 0.25, 0.0, 0.04).unwrap();
 }
 
-/// Normals that lean toward each other bring places above a square nearer to its middle, by no more than they lean.
+/// Normals that lean toward each other bring places above a square nearer to its middle, by no more than they
+/// lean.
 #[test]
 fn normals_that_lean_inward_are_bounded() {
     holds(4, 0, 0.7942938731436355, 1.0453565992581253, 0.0, 0.5).unwrap();
@@ -281,7 +286,8 @@ fn high_ridges_on_slopes_are_bounded_as_closely_as_asked() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
-    /// Nothing stands higher than figure and bound, on any part, by any cutter, with fine cells and coarse ones.
+    /// Nothing stands higher than figure and bound, on any part, by any cutter, with fine cells and coarse
+    /// ones.
     #[test]
     fn nothing_stands_above_the_bound(
         shape in 0usize..6,
@@ -344,8 +350,8 @@ fn sagitta(half: f64) -> f64 {
     3.0 - (9.0 - half * half).sqrt()
 }
 
-/// A floor, a wall, and a level above it: a pass on the floor leaves the more the nearer a place is to the wall, most of all in the
-/// strip of a cell whose centre lies beyond the wall.
+/// A floor, a wall, and a level above it: a pass on the floor leaves the more the nearer a place is to the
+/// wall, most of all in the strip of a cell whose centre lies beyond the wall.
 #[test]
 fn what_stands_at_the_foot_of_a_step_is_found_whatever_the_cells() {
     let (high, from_wall) = (0.3, 1.0);
@@ -365,8 +371,8 @@ fn what_stands_at_the_foot_of_a_step_is_found_whatever_the_cells() {
     }
 }
 
-/// The same where the wall meets the border, and passes on the floor part from the wall toward it: the upper level beside, which is cut
-/// down to the design, makes no foil of what stands in that corner.
+/// The same where the wall meets the border, and passes on the floor part from the wall toward it: the upper
+/// level beside, which is cut down to the design, makes no foil of what stands in that corner.
 #[test]
 fn what_stands_in_the_corner_of_a_step_and_the_border_is_found() {
     let (high, wall) = (0.3, 2.0);
@@ -401,7 +407,8 @@ fn what_stands_in_the_corner_of_a_step_and_the_border_is_found() {
     }
 }
 
-/// Cells wider than the intervals of the passes see some passes only. What they tell of ridges is true, or not told.
+/// Cells wider than the intervals of the passes see some passes only. What they tell of ridges is true, or
+/// not told.
 #[test]
 fn coarse_cells_tell_no_height_that_no_ridge_has() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
@@ -417,7 +424,8 @@ fn coarse_cells_tell_no_height_that_no_ridge_has() {
     assert!(told >= 3);
 }
 
-/// Straight passes over a plane leave ridges of a known height, and more along the border beyond the last one.
+/// Straight passes over a plane leave ridges of a known height, and more along the border beyond the last
+/// one.
 #[test]
 fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
@@ -440,8 +448,8 @@ fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
     );
 }
 
-/// A level patch whose far border is an arc in the plan: triangles end at its chords. What stands on the slivers between them
-/// is within the bound, with a tessellation of any fineness.
+/// A level patch whose far border is an arc in the plan: triangles end at its chords. What stands on the
+/// slivers between them is within the bound, with a tessellation of any fineness.
 #[test]
 fn what_stands_between_the_chords_of_a_bent_border_and_its_arc_is_bounded() {
     let row = |places: [[f64; 2]; 3]| places.map(|[x, y]| Point3::new(x, y, 0.0));
@@ -466,8 +474,8 @@ fn what_stands_between_the_chords_of_a_bent_border_and_its_arc_is_bounded() {
     }
 }
 
-/// Two flanks that meet in a bent crease: triangles of both end at chords of it, and those of the one lie under the other. The
-/// bound comes down there all the same.
+/// Two flanks that meet in a bent crease: triangles of both end at chords of it, and those of the one lie
+/// under the other. The bound comes down there all the same.
 #[test]
 fn the_bound_closes_along_a_bent_crease() {
     let flank = |out: f64, bend: f64| {
@@ -492,8 +500,9 @@ fn the_bound_closes_along_a_bent_crease() {
     }
 }
 
-/// Moves much shorter than a cell, each of its own depth: most win no cell, and are lowest over some place of a ridge. What stands
-/// there is what they left, and known as closely as elsewhere, also where no pass came down to the design.
+/// Moves much shorter than a cell, each of its own depth: most win no cell, and are lowest over some place of
+/// a ridge. What stands there is what they left, and known as closely as elsewhere, also where no pass came
+/// down to the design.
 #[test]
 fn short_moves_between_cells_leave_no_figure_open() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
@@ -525,8 +534,8 @@ fn short_moves_between_cells_leave_no_figure_open() {
     }
 }
 
-/// Passes far nearer to each other than cells end beside what is left: some of them win no cell and take the top off what seem to be
-/// ridges between others.
+/// Passes far nearer to each other than cells end beside what is left: some of them win no cell and take the
+/// top off what seem to be ridges between others.
 #[test]
 fn ridges_that_passes_between_cells_take_off_are_no_figures() {
     let (part, bull) = (part(0), Cutter::bull(6.0, 1.0).unwrap());
@@ -550,7 +559,8 @@ fn ridges_that_passes_between_cells_take_off_are_no_figures() {
     }
 }
 
-/// A flat whose rim ends beside the part's border by less than the last decimal of a program leaves a foil: nothing that stands.
+/// A flat whose rim ends beside the part's border by less than the last decimal of a program leaves a foil:
+/// nothing that stands.
 #[test]
 fn a_foil_that_rounding_leaves_is_no_material() {
     let (part, flat) = (part(0), Cutter::flat(3.0).unwrap());
@@ -583,7 +593,8 @@ fn a_foil_that_rounding_leaves_is_no_material() {
     assert!(excess.highest.at_most() >= TOP, "{excess:?}");
 }
 
-/// Between two passes of a flat aslant on a slope stands a strip: the longest lines along normals end at its upright side.
+/// Between two passes of a flat aslant on a slope stands a strip: the longest lines along normals end at its
+/// upright side.
 #[test]
 fn what_ends_at_the_side_of_a_cut_was_not_cut_away() {
     let part = formula(AnalyticShape::Inclined { height: 0.0, angle: 0.15, azimuth: 0.3 });
@@ -613,7 +624,8 @@ fn what_ends_at_the_side_of_a_cut_was_not_cut_away() {
     }
 }
 
-/// The rim of a flat leaves walls on slopes, and no move covers both of their sides. Bounds close all the same.
+/// The rim of a flat leaves walls on slopes, and no move covers both of their sides. Bounds close all the
+/// same.
 #[test]
 fn bounds_close_across_the_walls_that_flats_leave_on_slopes() {
     let flat = Cutter::flat(3.0).unwrap();

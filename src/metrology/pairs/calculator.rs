@@ -7,12 +7,12 @@ use motion::{ClPoint, MoveKind, Toolpath};
 use part::Part;
 use scallop::{BallSection, SurfaceCurvature, ridge_between};
 
-/// Tracks are parallel where their directions differ by no more than this, as a sine (1°): a section across one of them
-/// then sees the other as a circle to 0.02 % of the height.
+/// Tracks are parallel where their directions differ by no more than this, as a sine (1°): a section across
+/// one of them then sees the other as a circle to 0.02 % of the height.
 const PARALLEL: f64 = 0.017_45;
 
-/// Rounds of Newton's method in which the ridge is found; parallel tracks need two. Where a corner of a track keeps it from
-/// settling, no height is calculated.
+/// Rounds of Newton's method in which the ridge is found; parallel tracks need two. Where a corner of a track
+/// keeps it from settling, no height is calculated.
 const ROUNDS: usize = 16;
 
 /// The ridge is found when it moves by less than this, mm.
@@ -21,8 +21,8 @@ const SETTLED: f64 = 1e-10;
 /// Balls that meet at a smaller angle than this, as a sine, do not tell where.
 const LEAST_SINE: f64 = 1e-4;
 
-/// Rounds in which the nearest ball on a bowed way is found, the share of a move below which it is, and how far beside a share
-/// the slope and bend of the way are taken.
+/// Rounds in which the nearest ball on a bowed way is found, the share of a move below which it is, and how
+/// far beside a share the slope and bend of the way are taken.
 const BOWED_ROUNDS: usize = 12;
 const BOWED_SETTLED: f64 = 1e-9;
 const BESIDE: f64 = 1e-4;
@@ -72,9 +72,10 @@ impl<'a> Calculator<'a> {
         Self { part, path, radius, centre, curvature }
     }
 
-    /// The height of the ridge in the section across both tracks through the place of the design below a crossing: where the
-    /// balls of both tracks come as near as their radius. `None` where they do not meet, where the ridge runs across that section, where they meet in
-    /// another ridge than was crossed, or a move meets that is not of a pass: a link, a plunge, a lift.
+    /// The height of the ridge in the section across both tracks through the place of the design below a
+    /// crossing: where the balls of both tracks come as near as their radius. `None` where they do not meet,
+    /// where the ridge runs across that section, where they meet in another ridge than was crossed, or a move
+    /// meets that is not of a pass: a link, a plunge, a lift.
     pub fn at(&self, crossing: &RidgeCrossing) -> Option<Calculated> {
         if crossing.moves.iter().any(|k| self.path.moves[*k as usize].kind != MoveKind::Cut) {
             return None;
@@ -103,7 +104,8 @@ impl<'a> Calculator<'a> {
             at += across * x + up * y;
             let unsettled = x.hypot(y);
             if unsettled < SETTLED {
-                // Tracks that cross meet in ridges along both of their bisectors. A section sees that alone which it is across.
+                // Tracks that cross meet in ridges along both of their bisectors. A section sees that alone
+                // which it is across.
                 let ridge = (at - balls[0].centre).cross(&(at - balls[1].centre));
                 if ridge.dot(&feed).abs() <= ridge.dot(&across).abs() {
                     return None;
@@ -145,8 +147,8 @@ impl<'a> Calculator<'a> {
     fn nearest(&self, k: u32, q: &Point3) -> Nearest {
         let mut k = k as usize;
         let (mut here, mut share) = self.on_move(k, q);
-        // Each step comes nearer, so that it ends. On the hollow side of a bent track both chords of a corner have a nearest
-        // place of their own.
+        // Each step comes nearer, so that it ends. On the hollow side of a bent track both chords of a corner
+        // have a nearest place of their own.
         let nearer = |k: usize, here: &Point3| {
             let around = [self.beyond(k, true), self.beyond(k, false)].into_iter().flatten();
             let found = around.map(|next| (next, self.on_move(next, q)));
@@ -190,8 +192,8 @@ impl<'a> Calculator<'a> {
         self.ball(&self.path.moves[k].to) - self.ball(&self.path.location_before(k))
     }
 
-    /// Direction of the track at a share of a move. Chords of a bent track turn at their ends, where the track itself has the
-    /// mean direction of both.
+    /// Direction of the track at a share of a move. Chords of a bent track turn at their ends, where the
+    /// track itself has the mean direction of both.
     fn along(&self, k: usize, share: f64) -> Vector3 {
         let unit = |k: usize| self.way(k).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         let own = unit(k);
@@ -203,8 +205,8 @@ impl<'a> Calculator<'a> {
         mean(k.checked_sub(1)) * (1.0 - share) + mean(Some(k + 1)) * share
     }
 
-    /// The ball nearest to `q` on a move, and its share of the move. Where the axis turns the way bows; the share is then found
-    /// by Newton's method, begun on the chord.
+    /// The ball nearest to `q` on a move, and its share of the move. Where the axis turns the way bows; the
+    /// share is then found by Newton's method, begun on the chord.
     fn on_move(&self, k: usize, q: &Point3) -> (Point3, f64) {
         let (from, to) = (self.path.location_before(k), self.path.moves[k].to);
         let (a, way) = (self.ball(&from), self.way(k));
@@ -242,8 +244,9 @@ mod tests {
     use motion::Move;
     use part::Patch;
 
-    /// A ball that rolls around an edge, its axis turning by `turn` rad a move: the nearest ball is that of the finest look at
-    /// all moves, from whichever move near it the search begins, inside the bow and outside of it.
+    /// A ball that rolls around an edge, its axis turning by `turn` rad a move: the nearest ball is that of
+    /// the finest look at all moves, from whichever move near it the search begins, inside the bow and
+    /// outside of it.
     #[test]
     fn the_nearest_ball_of_turning_moves_is_found() {
         let surface = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-9.0, 9.0]; 2]).unwrap();

@@ -97,7 +97,8 @@ fn calculated_and_measured_agree_on_planes_and_cylinders() {
     }
 }
 
-/// Passes that spread: the balls still tell the ridge, and the section, which takes them for parallel, does not.
+/// Passes that spread: the balls still tell the ridge, and the section, which takes them for parallel, does
+/// not.
 #[test]
 fn passes_that_spread_are_not_parallel() {
     let part = part(AnalyticShape::Plane { height: 0.0 });

@@ -1,16 +1,17 @@
 //! Vertical walls under upright cutters, measured along their normals against the moves themselves.
 //!
-//! Enters: the vertical facets of a mesh, and the moves. Leaves: the deepest cut and the highest material of each strip of a
-//! wall, as regions and figures, and what of tops and floors belongs to a wall. mm.
+//! Enters: the vertical facets of a mesh, and the moves. Leaves: the deepest cut and the highest material of
+//! each strip of a wall, as regions and figures, and what of tops and floors belongs to a wall. mm.
 //!
-//! Cells look down. Where a cutter goes a few µm too far into a wall, or leaves as much, they see a place beside it that lies the
-//! whole wall too deep or too high. Such a place is no farther off the design than the wall's own cut is deep, and counts so:
+//! Cells look down. Where a cutter goes a few µm too far into a wall, or leaves as much, they see a place
+//! beside it that lies the whole wall too deep or too high. Such a place is no farther off the design than
+//! the wall's own cut is deep, and counts so:
 //!
 //! - on a top, up to the depth that moves cut into the wall below it;
 //! - on a floor, up to the material that stands before the wall above it.
 //!
-//! The other way round, what a move takes off the edge of a top is no deeper in the wall than it is below the top, and what stands
-//! on a floor up to the uncut tolerance is the floor's.
+//! The other way round, what a move takes off the edge of a top is no deeper in the wall than it is below the
+//! top, and what stands on a floor up to the uncut tolerance is the floor's.
 
 mod piece;
 mod reach;
@@ -33,8 +34,8 @@ use piece::{QUARTERS, SHORTEST, WallPiece};
 use reach::Moves;
 use search::{Deepest, Highest, Standing};
 
-/// Length of a strip over the cell. Longer ones make more of a floor belong to a wall where something stands; shorter ones take
-/// more time.
+/// Length of a strip over the cell. Longer ones make more of a floor belong to a wall where something stands;
+/// shorter ones take more time.
 const STRIP_OVER_CELL: f64 = 8.0;
 
 /// Cells along the side of a bin of moves.
@@ -43,7 +44,8 @@ const CELLS_PER_BIN: usize = 16;
 /// Strips that one worker measures before it asks whether to stop.
 const RUN: usize = 64;
 
-/// A floor ends at a wall where it is no farther than this from its lower edge, mm, and its slope times the distance.
+/// A floor ends at a wall where it is no farther than this from its lower edge, mm, and its slope times the
+/// distance.
 const TOUCHING: f64 = 1e-3;
 const STEEPEST: f64 = 5.0;
 
@@ -80,7 +82,8 @@ pub(super) struct Walls {
 
 struct Strip {
     piece: WallPiece,
-    /// Where the wall comes to below it, at both ends: its floor where other strips lead down there without a gap, else its lower edge.
+    /// Where the wall comes to below it, at both ends: its floor where other strips lead down there without a
+    /// gap, else its lower edge.
     foot: [f64; 2],
     cut: Deepest,
     stands: Highest,
@@ -199,8 +202,8 @@ impl Walls {
         -self.near(q).filter_map(of).fold(-deviation, f64::min)
     }
 
-    /// The lines before walls, in the plan, that floor at a place around which all of `corners` lie begins at: a point of each
-    /// and the unit vector toward the floor.
+    /// The lines before walls, in the plan, that floor at a place around which all of `corners` lie begins
+    /// at: a point of each and the unit vector toward the floor.
     pub fn lines<'b>(
         &'b self,
         p: &'b Point3,

@@ -1,15 +1,15 @@
 //! Vertical facets in strips: short in the plan, as high as the facet.
 //!
-//! Enters: the facets of a mesh that stand along the tool axis. Leaves: strips between two straight edges, with the design's
-//! surface in front of and behind each. mm.
+//! Enters: the facets of a mesh that stand along the tool axis. Leaves: strips between two straight edges,
+//! with the design's surface in front of and behind each. mm.
 
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::Part;
 
 use crate::facing::LEAST_FACING;
 
-/// How far in front of a wall its floor is looked for, and behind it the top, mm. Less than rounding of mesh files finds the
-/// wall itself; more misses what is narrower.
+/// How far in front of a wall its floor is looked for, and behind it the top, mm. Less than rounding of mesh
+/// files finds the wall itself; more misses what is narrower.
 const ASIDE: f64 = 1e-3;
 
 /// Strips shorter than this are of no account, mm.
@@ -50,8 +50,8 @@ pub(super) struct WallPiece {
     pub top: [f64; 2],
     /// How far the facet goes on beyond both ends.
     pub beyond: [f64; 2],
-    /// What lies on the other side of the medial axis to the wall beyond an end is that wall's: how fast the axis leaves this
-    /// wall behind a convex edge, and before a concave one; infinite where there is none.
+    /// What lies on the other side of the medial axis to the wall beyond an end is that wall's: how fast the
+    /// axis leaves this wall behind a convex edge, and before a concave one; infinite where there is none.
     pub behind: [f64; 2],
     pub before: [f64; 2],
 }
@@ -122,8 +122,8 @@ impl WallPiece {
         0.5 * self.length * (self.high[0] - self.low[0] + self.high[1] - self.low[1])
     }
 
-    /// With floor and top, as the design has them a quarter of the length from both ends. `bottom` is the floor where nothing
-    /// lies in front.
+    /// With floor and top, as the design has them a quarter of the length from both ends. `bottom` is the
+    /// floor where nothing lies in front.
     fn with_surroundings(mut self, part: &Part, bottom: f64) -> Self {
         let quarters = QUARTERS.map(|share| share * self.length);
         let floor = quarters.map(|u| height_at(part, &self, u, ASIDE).unwrap_or(bottom));
@@ -139,7 +139,8 @@ impl WallPiece {
             let end = [0.0, self.length][side];
             let rise = (self.top[1] - self.top[0]) / self.length;
             let top = self.top[side] + rise * (u - end);
-            // A cut from the top leads out over a lower one beyond the end; tops that fall no more than a slope does are the same one.
+            // A cut from the top leads out over a lower one beyond the end; tops that fall no more than a
+            // slope does are the same one.
             let behind = |aside: f64| level.max(top - STEEPEST * (ahead + aside));
             let is_solid =
                 |aside: f64, level: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
@@ -173,7 +174,8 @@ fn height_at(part: &Part, piece: &WallPiece, u: f64, aside: f64) -> Option<f64> 
     part.highest_at(q.x, q.y).map(|design| design.point.z)
 }
 
-/// How fast the medial axis at the end of a wall leaves it, where the wall turns so that `holds` up to some way aside, so far `ahead`, mm.
+/// How fast the medial axis at the end of a wall leaves it, where the wall turns so that `holds` up to some
+/// way aside, so far `ahead`, mm.
 fn medial(ahead: f64, holds: &dyn Fn(f64) -> bool) -> f64 {
     if !holds(STRAIGHT * ahead) {
         return f64::INFINITY;

@@ -1,7 +1,7 @@
 //! What one move takes off a level line before a wall.
 //!
-//! What a cutter sweeps along a straight move, and all above it, is convex. So a level line meets it in one stretch, and the
-//! height of the cut over that line is a convex function. mm.
+//! What a cutter sweeps along a straight move, and all above it, is convex. So a level line meets it in one
+//! stretch, and the height of the cut over that line is a convex function. mm.
 
 use geometry::{Point2, Point3, Vector2};
 use motion::{Cutters, Toolpath};
@@ -48,7 +48,8 @@ impl Moves<'_> {
         self.envelope.height(k, q.x, q.y).unwrap_or(f64::INFINITY)
     }
 
-    /// Where the cut of a move begins on a line; `None` where it takes nothing of the line in front of its begin.
+    /// Where the cut of a move begins on a line; `None` where it takes nothing of the line in front of its
+    /// begin.
     pub fn begin(&self, k: u32, line: &Line) -> Option<f64> {
         let [a, b] = self.ends(k);
         if a.z.min(b.z) > line.z {
@@ -113,7 +114,8 @@ pub(super) fn greatest(f: &dyn Fn(f64) -> f64, [mut a, mut b]: [f64; 2], enough:
     best
 }
 
-/// The stretch of the line from `from` along the unit vector `way` within `radius` of the segment from `a` to `b`.
+/// The stretch of the line from `from` along the unit vector `way` within `radius` of the segment from `a` to
+/// `b`.
 pub(super) fn stadium(a: &Point2, b: &Point2, radius: f64, from: Point2, way: Vector2) -> Option<[f64; 2]> {
     let across = Vector2::new(-way.y, way.x);
     let seen = |p: &Point2| [(p - from).dot(&way), (p - from).dot(&across)];

@@ -1,8 +1,9 @@
 //! The deepest cut into one strip of a wall, and the highest material before it.
 //!
-//! Over a strip the place where one move begins to cut is a convex function. So its deepest cut has one hill, which a golden
-//! section climbs, and what it leaves at most stands at a corner: the least such corner over all moves bounds what stands in
-//! a part of the strip. Parts are divided until that is as near to what was found as was asked. mm.
+//! Over a strip the place where one move begins to cut is a convex function. So its deepest cut has one hill,
+//! which a golden section climbs, and what it leaves at most stands at a corner: the least such corner over
+//! all moves bounds what stands in a part of the strip. Parts are divided until that is as near to what was
+//! found as was asked. mm.
 
 use geometry::{Point2, Vector2};
 
@@ -43,8 +44,8 @@ pub(super) struct Highest {
     pub share: f64,
 }
 
-/// The deepest that `moves` cut into a strip. A cut through an edge
-/// belongs to the nearer side: it is no deeper than it is below the top, and than the wall beyond the end is near.
+/// The deepest that `moves` cut into a strip. A cut through an edge belongs to the nearer side: it is no
+/// deeper than it is below the top, and than the wall beyond the end is near.
 pub(super) fn deepest(piece: &WallPiece, moves: &Moves<'_>, near: &[u32]) -> Deepest {
     let mut found = Deepest::default();
     for &k in near {
@@ -185,7 +186,8 @@ impl Standing<'_> {
         piece.low_at(u).max(piece.floor_at(u) + self.of_floor).min(piece.high_at(u))
     }
 
-    /// The shares of a strip where it rises above what is its floor's: up to each, both of its borders there are straight.
+    /// The shares of a strip where it rises above what is its floor's: up to each, both of its borders there
+    /// are straight.
     fn above_floor(&self, piece: &WallPiece) -> Vec<[f64; 2]> {
         let mut ends = vec![0.0, 1.0];
         for edge in [piece.low, piece.high] {
@@ -210,7 +212,8 @@ impl Standing<'_> {
             [u, low + (piece.high_at(u) - low) * v]
         });
         let lines = at.map(|[u, z]| Line { from: piece.place(u, z).xy(), way: piece.normal, z });
-        // Each of these is convex along the strip and upward. The least of them is not: material is highest between two ends.
+        // Each of these is convex along the strip and upward. The least of them is not: material is highest
+        // between two ends.
         let ends = [0, 1, 2, 3].map(|c| {
             let ([x, y], [first, last]) =
                 ((self.way_out)(lines[c].from, lines[c].way), piece.own_heights(at[c][0]));

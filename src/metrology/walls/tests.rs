@@ -79,7 +79,8 @@ fn measured_on(cell: f64, part: &Part, cutter: &Cutter, path: &Toolpath) -> Meas
     measure_with_walls(part, &cutter.into(), path, &cut, &LIMITS, &asked, Some(&facing), &Silent).unwrap()
 }
 
-/// Rows over the top, at the height of `z`, and a way around at the tip height `below` whose sides are `off` from the walls.
+/// Rows over the top, at the height of `z`, and a way around at the tip height `below` whose sides are `off`
+/// from the walls.
 fn faced_and_around(radius: f64, z: f64, off: [f64; 4], below: f64) -> Toolpath {
     let [x, y] = SIZE;
     let rows = (0..=6).flat_map(|k| {
@@ -156,7 +157,8 @@ fn a_cut_over_the_edge_of_a_top_is_no_deeper_than_below_it() {
     assert!((ball.gouge.max_depth_mm - depth).abs() < 1e-6, "{:?}", ball.gouge);
 }
 
-/// In an inner corner a cutter of radius r leaves material that is farthest from both walls on the diagonal: r (1 - 1/√2).
+/// In an inner corner a cutter of radius r leaves material that is farthest from both walls on the diagonal:
+/// r (1 - 1/√2).
 #[test]
 fn an_inner_corner_keeps_what_the_cutter_does_not_reach() {
     let part = steps(
@@ -196,8 +198,9 @@ fn an_inner_corner_keeps_what_the_cutter_does_not_reach() {
     assert!(measured.excess.unreached.error_bound_mm < 2e-3, "{:?}", measured.excess);
 }
 
-/// A step from a floor at z = 1 up to `high` over it, along y = 4 on `length` mm, as a cutter of a radius leaves it: rows over the top, rows
-/// over the floor from `aside` before the step on, and once around the outer walls.
+/// A step from a floor at z = 1 up to `high` over it, along y = 4 on `length` mm, as a cutter of a radius
+/// leaves it: rows over the top, rows over the floor from `aside` before the step on, and once around the
+/// outer walls.
 fn step(length: f64, high: f64, radius: f64, aside: f64) -> (Part, Toolpath) {
     let floor = 1.0;
     let top = floor + high;
@@ -225,7 +228,8 @@ fn step(length: f64, high: f64, radius: f64, aside: f64) -> (Part, Toolpath) {
     (part, path)
 }
 
-/// The facets of a long wall meet aslant: beside the lower one, far below the top, the wall above it stands before the floor as well.
+/// The facets of a long wall meet aslant: beside the lower one, far below the top, the wall above it stands
+/// before the floor as well.
 #[test]
 fn floors_beside_facets_that_meet_aslant_belong_to_the_wall() {
     let radius = 3.0;
@@ -239,8 +243,8 @@ fn floors_beside_facets_that_meet_aslant_belong_to_the_wall() {
     }
 }
 
-/// What a ball leaves at the foot of a step that is little higher than the uncut tolerance is the same on all cells: the floor's up to the
-/// uncut tolerance, and above that a few µm before the wall.
+/// What a ball leaves at the foot of a step that is little higher than the uncut tolerance is the same on all
+/// cells: the floor's up to the uncut tolerance, and above that a few µm before the wall.
 #[test]
 fn what_stands_at_the_foot_of_a_low_step_does_not_depend_on_cells() {
     let (radius, aside) = (1.5f64, 0.41);
@@ -295,8 +299,8 @@ fn faced(far: f64) -> impl Iterator<Item = Point3> {
     })
 }
 
-/// A round plate of facets from z = 0 up, with a round hole of as many, whose mid-facets lie `radius` from the axis; and how a flat
-/// that is as wide as the hole cuts its outer wall and, down to `bottom`, the hole.
+/// A round plate of facets from z = 0 up, with a round hole of as many, whose mid-facets lie `radius` from
+/// the axis; and how a flat that is as wide as the hole cuts its outer wall and, down to `bottom`, the hole.
 fn drilled(facets: usize, radius: f64, bottom: Option<f64>) -> (Part, Cutter, Toolpath) {
     let part =
         turned(facets, &[[radius, 0.0], [3.0 * radius, 0.0], [3.0 * radius, HEIGHT], [radius, HEIGHT]]);
@@ -306,7 +310,8 @@ fn drilled(facets: usize, radius: f64, bottom: Option<f64>) -> (Part, Cutter, To
     (part, Cutter::flat(2.0 * radius).unwrap(), path)
 }
 
-/// What is left in a hole stands out from its wall by the hole's radius, however narrow the facets are beside the cells.
+/// What is left in a hole stands out from its wall by the hole's radius, however narrow the facets are beside
+/// the cells.
 #[test]
 fn a_plug_left_in_a_round_hole_stands() {
     let radius = 1.5;
@@ -335,8 +340,8 @@ fn a_drilled_hole_holds_no_more_than_its_corners() {
         assert!(excess.highest.at_most() < corner + 2e-3, "{facets} {cell} {excess:?} {corner}");
     }
 }
-/// A ring with a floor at z = 1 before a round wall whose corners lie 4 mm from the axis, inside of it (a pocket) or outside (a boss). A flat
-/// of 2 mm follows the true circle and leaves `thick` on it.
+/// A ring with a floor at z = 1 before a round wall whose corners lie 4 mm from the axis, inside of it (a
+/// pocket) or outside (a boss). A flat of 2 mm follows the true circle and leaves `thick` on it.
 fn round_wall(facets: usize, is_pocket: bool, thick: f64) -> (Part, Cutter, Toolpath) {
     const SIDES: usize = 2000;
     let (tool, hole, wall, out, floor) = (1.0, 1.0, 4.0, 7.0, 1.0);

@@ -1,7 +1,7 @@
 //! The lattice near the level set: bricks of 8 × 8 × 8 cells, found from coarse to fine.
 //!
-//! The distance changes by no more than a place moves, so that a cube whose middle is farther from the level set than its
-//! corners are from the middle holds nothing of it.
+//! The distance changes by no more than a place moves, so that a cube whose middle is farther from the level
+//! set than its corners are from the middle holds nothing of it.
 
 use super::level_set::LevelSet;
 use super::{OffsetError, OffsetSettings};
@@ -15,8 +15,9 @@ pub(super) const SIDE: usize = 8;
 /// Corners a side of a brick.
 pub(super) const CORNERS: usize = SIDE + 1;
 
-/// What a brick takes, bytes: values at its corners and crossings of its edges while it is worked on, and some 90 cells with a
-/// vertex, two triangles and the tables to trim and to look through them (measured: 30 to 45 thousand).
+/// What a brick takes, bytes: values at its corners and crossings of its edges while it is worked on, and
+/// some 90 cells with a vertex, two triangles and the tables to trim and to look through them (measured: 30
+/// to 45 thousand).
 const BYTES: f64 = 48e3;
 
 /// Share of the coarse cubes near the level set that is sure to be crossed by it.
@@ -68,8 +69,8 @@ impl Lattice {
     }
 }
 
-/// A brick: its cells through which the level set passes, and by how much their corners are farther from the mesh than
-/// that.
+/// A brick: its cells through which the level set passes, and by how much their corners are farther from the
+/// mesh than that.
 pub(super) struct Brick {
     /// Its least corner in the lattice.
     pub low: [u32; 3],
@@ -120,7 +121,8 @@ impl Bricks {
         monitor.start("lattice around the offset surface", 0);
         let lattice = Lattice::around(level, settings.cell);
         let Some(cubes) = cubes(level, &lattice, most, monitor)? else {
-            // The count of coarser cells tells what finer ones would take: four times as many for half the side.
+            // The count of coarser cells tells what finer ones would take: four times as many for half the
+            // side.
             let (mut coarser, mut cell) = (None, settings.cell);
             while coarser.is_none() && cell < level.distance() * 1e6 {
                 cell *= 2.0;
@@ -171,7 +173,8 @@ fn cubes(
         let side = (SIDE as u32) << k;
         let kept = parallel::map(cubes.len(), |c| lattice.is_near(level, cubes[c], side));
         cubes = cubes.iter().zip(kept).filter(|(_, kept)| *kept).map(|(c, _)| *c).collect();
-        // A sheet passes through four of the eight halves of a cube; of coarse cubes some hold next to nothing of it.
+        // A sheet passes through four of the eight halves of a cube; of coarse cubes some hold next to
+        // nothing of it.
         let ahead = if k > 0 { COARSE_SHARE * 4f64.powi(k as i32) } else { 1.0 };
         if cubes.len() as f64 * ahead > most {
             return Ok(None);

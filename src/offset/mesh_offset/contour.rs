@@ -1,7 +1,8 @@
-//! The level set as triangles: a vertex for each piece of it in a cell, a quadrilateral around each edge of the lattice that
-//! crosses it.
+//! The level set as triangles: a vertex for each piece of it in a cell, a quadrilateral around each edge of
+//! the lattice that crosses it.
 //!
-//! Inside is what is nearer to the mesh; each sheet in a cell is one ring of crossings ([`geometry::sheets`]).
+//! Inside is what is nearer to the mesh; each sheet in a cell is one ring of crossings
+//! ([`geometry::sheets`]).
 
 use super::OffsetError;
 use super::bricks::{Brick, Bricks, CORNERS, SIDE, cell_number, cell_place, corner_index, corners_of};
@@ -13,7 +14,8 @@ use geometry::{Point3, Vector3};
 use work::monitor::{Monitor, check};
 use work::parallel;
 
-/// Crossings of edges are sought to this share of a cell: beside a valley a lesser one would tell the wrong side.
+/// Crossings of edges are sought to this share of a cell: beside a valley a lesser one would tell the wrong
+/// side.
 const NEAR: f64 = 1e-7;
 
 /// Looks along an edge at most.
@@ -160,7 +162,8 @@ impl Net<'_> {
         triangles
     }
 
-    /// The two triangles around the edge from corner `at` along `axis`; `outward` where the mesh is nearer to that corner.
+    /// The two triangles around the edge from corner `at` along `axis`; `outward` where the mesh is nearer to
+    /// that corner.
     fn quadrilateral(&self, at: [u32; 3], axis: usize, outward: bool, here: usize, to: &mut Vec<[u32; 3]>) {
         let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
         let around = [(1, 1), (0, 1), (0, 0), (1, 0)].map(|(below_b, below_c)| {
@@ -176,8 +179,8 @@ impl Net<'_> {
         to.extend(if self.straight([p, q, r, s]) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] });
     }
 
-    /// Whether a quadrilateral is divided from its first to its third corner: valleys run along edges, and three corners on
-    /// one of them make no triangle.
+    /// Whether a quadrilateral is divided from its first to its third corner: valleys run along edges, and
+    /// three corners on one of them make no triangle.
     fn straight(&self, ring: [u32; 4]) -> bool {
         let corner = ring.map(|v| self.all[v as usize]);
         let deep = corner.map(|v| v.angle > 0.0);

@@ -11,12 +11,13 @@ const PRECISION: f64 = 1e-14;
 /// Steps of the search along a line at most; each halves its bracket at least every other time.
 const LINE_STEPS: usize = 90;
 
-/// The sheet ends where its triangles turn back with a cosine between their normals below this: slivers that are folded
-/// over along a border hide it. Greater would take sharp convex edges for borders, less leaves slivers that are folded a
-/// little less.
+/// The sheet ends where its triangles turn back with a cosine between their normals below this: slivers that
+/// are folded over along a border hide it. Greater would take sharp convex edges for borders, less leaves
+/// slivers that are folded a little less.
 const FOLD: f64 = -0.85;
 
-/// A triangle whose height is less than this share of its longest side is a sliver; which way it is folded is chance.
+/// A triangle whose height is less than this share of its longest side is a sliver; which way it is folded is
+/// chance.
 const SLIVER: f64 = 0.05;
 
 /// All places whose distance from a mesh is `distance`.
@@ -133,8 +134,8 @@ impl<'a> LevelSet<'a> {
         self.bvh.closest_point(self.mesh, x).signed_distance.abs() - self.distance
     }
 
-    /// How far a ball at this place, which touches the mesh, has rolled over its border, mm; 0 where it touches the outward
-    /// side elsewhere, `None` where it touches the other side.
+    /// How far a ball at this place, which touches the mesh, has rolled over its border, mm; 0 where it
+    /// touches the outward side elsewhere, `None` where it touches the other side.
     pub fn rolled(&self, foot: &LevelSetFoot) -> Option<f64> {
         if foot.on_border {
             return Some((foot.direction - foot.normal).norm() * self.distance);
@@ -153,9 +154,9 @@ impl<'a> LevelSet<'a> {
         Plane { point: foot.point + foot.direction * self.distance, normal: foot.direction }
     }
 
-    /// The place of the level set straight toward or away from the nearest point of the mesh, or, where another one is as
-    /// near, along the line from `x` in the unit direction `along`, which leads away from the mesh. `None` where that line
-    /// meets no such place within `reach`, mm.
+    /// The place of the level set straight toward or away from the nearest point of the mesh, or, where
+    /// another one is as near, along the line from `x` in the unit direction `along`, which leads away from
+    /// the mesh. `None` where that line meets no such place within `reach`, mm.
     pub fn settled(&self, x: &Point3, along: &Vector3, reach: f64) -> Option<Point3> {
         let plane = self.plane(x);
         if (plane.point - x).norm() <= reach && self.excess(&plane.point).abs() <= self.precision(x) {
@@ -164,8 +165,8 @@ impl<'a> LevelSet<'a> {
         self.on_line(x, along, reach)
     }
 
-    /// The place of the level set on the line from `x` along the unit vector `along` that is found first on the way out (where
-    /// `x` is too near to the mesh) or in, within `reach`, mm.
+    /// The place of the level set on the line from `x` along the unit vector `along` that is found first on
+    /// the way out (where `x` is too near to the mesh) or in, within `reach`, mm.
     pub fn on_line(&self, x: &Point3, along: &Vector3, reach: f64) -> Option<Point3> {
         let near = self.precision(x);
         let mut from = (0.0f64, self.excess(x));

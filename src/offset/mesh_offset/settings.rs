@@ -21,7 +21,8 @@ pub struct OffsetSettings {
 /// Cells are at most this share of the distance: between the two sides of a sheet there must be a few.
 const WIDEST_CELL: f64 = 0.25;
 
-/// Cells are at least this share of the mesh's greatest coordinate or of the distance: their numbers fit 20 bits.
+/// Cells are at least this share of the mesh's greatest coordinate or of the distance: their numbers fit 20
+/// bits.
 const NARROWEST_CELL: f64 = 1e-6;
 
 impl OffsetSettings {

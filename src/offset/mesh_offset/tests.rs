@@ -52,7 +52,8 @@ fn distance(mesh: &TriangleMesh, q: &Point3) -> f64 {
     (0..mesh.triangles().len()).map(of_triangle).fold(f64::INFINITY, f64::min)
 }
 
-/// Every vertex on the level set, by brute force, and triangles that make a surface facing away from the mesh.
+/// Every vertex on the level set, by brute force, and triangles that make a surface facing away from the
+/// mesh.
 fn assert_sound(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) {
     let folded = folded(of, found, d);
     assert!(folded < 1e-4, "{folded} of it faces the mesh");
@@ -80,8 +81,8 @@ fn folded(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
     inward / all
 }
 
-/// Greatest difference between the distance from the mesh and `d` in the middles of triangles and edges, mm; without triangles
-/// at a border, which may cut across a valley's end.
+/// Greatest difference between the distance from the mesh and `d` in the middles of triangles and edges, mm;
+/// without triangles at a border, which may cut across a valley's end.
 fn deviation(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
     let level = LevelSet::new(&of.0, &of.1, d);
     let mesh = found.mesh().unwrap();
@@ -244,7 +245,8 @@ fn of_a_sphere_is_a_sphere_inside_and_out() {
         }
         let soup = points(sense).iter().map(|p| Point3::from(*p)).collect();
         let band = TriangleMesh::new(soup, triangles).unwrap().0;
-        // Open meshes are turned to face up; a band is neither, so both senses are tried and told by the result.
+        // Open meshes are turned to face up; a band is neither, so both senses are tried and told by the
+        // result.
         let outward = band.normal(0).dot(&band.corners(0)[0].coords) > 0.0;
         let radius = if outward == (sense > 0.0) { radius } else { 20.0 - radius };
         let band = (Bvh::new(&band), band);
@@ -370,8 +372,8 @@ fn work_can_be_stopped() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5, ..ProptestConfig::default() })]
 
-    /// Rough ground: vertices on the level set, nothing of the surface much nearer to the mesh, and every place of the level
-    /// set above the middle of the ground near the surface.
+    /// Rough ground: vertices on the level set, nothing of the surface much nearer to the mesh, and every
+    /// place of the level set above the middle of the ground near the surface.
     #[test]
     fn rough_ground(heights in prop::collection::vec(0.0..1.5f64, 25), d in 0.8..2.0f64, places in prop::collection::vec((2.0..6.0f64, 2.0..6.0f64), 12)) {
         let ground = grid(4, 4, false, |u, v| {

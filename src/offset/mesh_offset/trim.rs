@@ -125,8 +125,8 @@ impl Kept<'_> {
     }
 }
 
-/// The last place along the edge from `a`, which is kept, to `b`, which is not, that is kept, on the level set; `None` for `a`
-/// itself.
+/// The last place along the edge from `a`, which is kept, to `b`, which is not, that is kept, on the level
+/// set; `None` for `a` itself.
 fn end_of(level: &LevelSet, a: Point3, b: Point3, holds: &dyn Fn(&Point3) -> bool) -> Option<Point3> {
     let along = b - a;
     let reach = along.norm();
@@ -150,13 +150,13 @@ fn end_of(level: &LevelSet, a: Point3, b: Point3, holds: &dyn Fn(&Point3) -> boo
     best.filter(|_| inside > AT_CORNER)
 }
 
-/// Sides shorter than this share of a triangle's longest one have one place for both ends; a triangle whose height is a lesser
-/// share has no area.
+/// Sides shorter than this share of a triangle's longest one have one place for both ends; a triangle whose
+/// height is a lesser share has no area.
 const NO_LENGTH: f64 = 1e-6;
 const NO_HEIGHT: f64 = 1e-7;
 
-/// Without triangles that have no area and vertices that no triangle uses: where valleys meet lattice planes, vertices of
-/// neighbouring cells coincide, and three may stand on one line.
+/// Without triangles that have no area and vertices that no triangle uses: where valleys meet lattice planes,
+/// vertices of neighbouring cells coincide, and three may stand on one line.
 fn compacted(mut contour: Contour) -> Contour {
     weld(&mut contour);
     flip(&mut contour);

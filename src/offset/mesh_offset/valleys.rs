@@ -1,5 +1,5 @@
-//! The lines along which two places of the mesh are equally near: edges of the contour between vertices that lie on both,
-//! chained.
+//! The lines along which two places of the mesh are equally near: edges of the contour between vertices that
+//! lie on both, chained.
 
 use std::collections::BTreeMap;
 
@@ -8,11 +8,12 @@ use super::contour::Contour;
 use super::level_set::LevelSet;
 use geometry::{Point3, Vector3, share_on};
 
-/// Two faces meet in a valley where the angle between them is at least this share of the one between the directions to the
-/// mesh.
+/// Two faces meet in a valley where the angle between them is at least this share of the one between the
+/// directions to the mesh.
 const SHARE: f64 = 0.4;
 
-/// A line along which two places of the mesh, or more, are equally near and as far away as the offset surface.
+/// A line along which two places of the mesh, or more, are equally near and as far away as the offset
+/// surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Valley {
     /// Places, mm, along the line; on both sides' level sets to 1e-9 mm.
@@ -86,8 +87,8 @@ pub(super) fn valleys(level: &LevelSet, contour: &Contour, settings: &OffsetSett
     valleys
 }
 
-/// Runs a line on from its last place to where the valley ends, or leaves the outward side of the mesh and its margin: beside
-/// borders the contour does not tell.
+/// Runs a line on from its last place to where the valley ends, or leaves the outward side of the mesh and
+/// its margin: beside borders the contour does not tell.
 fn extend(level: &LevelSet, points: &mut Vec<Point3>, settings: &OffsetSettings) {
     let holds = |x: &Point3| level.rolled(&level.foot(x)).is_some_and(|rolled| rolled <= settings.margin);
     let next = |from: &Point3, along: &Vector3, step: f64| {

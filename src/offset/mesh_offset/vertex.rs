@@ -6,20 +6,20 @@ use geometry::{Plane, Point3, Vector3, into_cube};
 /// Planes whose normals spread less than the square root of this, rad, are one plane.
 const FLAT: f64 = 1e-6;
 
-/// How much nearer to a vertex its planes are taken each time, and how often. The last ones are taken a hundred-thousandth of
-/// a cell away: what they miss of a bent surface is of second order in that.
+/// How much nearer to a vertex its planes are taken each time, and how often. The last ones are taken a
+/// hundred-thousandth of a cell away: what they miss of a bent surface is of second order in that.
 const NEARER: f64 = 0.1;
 const TIMES: i32 = 5;
 
-/// Normals that still spread by this share of what they did from ten times as far away belong to different places of the
-/// mesh.
+/// Normals that still spread by this share of what they did from ten times as far away belong to different
+/// places of the mesh.
 const STAYS: f64 = 0.5;
 
 /// Shallower valleys than this, rad, are not told from smooth places.
 const LEAST_VALLEY: f64 = 5e-3;
 
-/// Between steep sides a valley may be deeper than the cell that sees both: the vertex may lie this many times as far from the
-/// middle of a cell as its faces, in cells that see nothing of the surface.
+/// Between steep sides a valley may be deeper than the cell that sees both: the vertex may lie this many
+/// times as far from the middle of a cell as its faces, in cells that see nothing of the surface.
 const DEEPER: f64 = 4.0;
 
 /// A cell in which a vertex is sought.
@@ -38,7 +38,8 @@ impl Around<'_> {
     }
 }
 
-/// A vertex: where it is, and the angle between the directions to the mesh's points nearest to it, rad (0 for one).
+/// A vertex: where it is, and the angle between the directions to the mesh's points nearest to it, rad (0 for
+/// one).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Vertex {
     pub point: Point3,
@@ -72,8 +73,8 @@ fn directions() -> impl Iterator<Item = Vector3> {
 }
 
 impl LevelSet<'_> {
-    /// The place of a valley within `reach`, mm, of a place near it, and the angle between the directions to the mesh's
-    /// nearest points there, rad; `None` where there is none.
+    /// The place of a valley within `reach`, mm, of a place near it, and the angle between the directions to
+    /// the mesh's nearest points there, rad; `None` where there is none.
     ///
     /// # Tolerance
     /// The place lies on the level sets of both sides to 1e-9 mm.
@@ -90,8 +91,8 @@ impl LevelSet<'_> {
 /// A place counts as on a valley when it is this near to the level set, mm.
 const ON_VALLEY: f64 = 5e-10;
 
-/// The place where two or more points of the mesh are equally near and `distance` away, and the angle between the directions
-/// to them, seen from a place near it: `crossings` are places of the level set around.
+/// The place where two or more points of the mesh are equally near and `distance` away, and the angle between
+/// the directions to them, seen from a place near it: `crossings` are places of the level set around.
 fn valley_near(level: &LevelSet, planes: &[Plane], crossings: &[Point3], around: &Around) -> (Point3, f64) {
     let mean = Point3::from(planes.iter().map(|p| p.point.coords).sum::<Vector3>() / planes.len() as f64);
     let first = spread(planes);
@@ -129,7 +130,8 @@ fn mean_normal(planes: &[Plane]) -> Vector3 {
     sum.try_normalize(1e-6).unwrap_or_else(|| planes.first().map_or(Vector3::z(), |p| p.normal))
 }
 
-/// Where no line search helps: on one of the planes, or the nearest of the level set that straight ways to the mesh find.
+/// Where no line search helps: on one of the planes, or the nearest of the level set that straight ways to
+/// the mesh find.
 fn nearest_of(level: &LevelSet, point: &Point3, planes: &[Plane]) -> Point3 {
     let mut x = *point;
     for _ in 0..64 {

@@ -1,4 +1,5 @@
-//! What coordinates are counted from: work offsets, lengths of tools, local zeros, turned coordinates, places of the machine.
+//! What coordinates are counted from: work offsets, lengths of tools, local zeros, turned coordinates, places
+//! of the machine.
 
 use super::{AXES, AXIS_BITS, Asked, Interpreter};
 use crate::block::CodeWord;
@@ -98,7 +99,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G10 L1 of LinuxCNC: length and radius of a tool. G10 L10 to L13 of Fanuc: length, its wear, radius, its wear.
+    /// G10 L1 of LinuxCNC: length and radius of a tool. G10 L10 to L13 of Fanuc: length, its wear, radius,
+    /// its wear.
     fn tool_data(&mut self, kind: u32, number: Option<f64>, word: CodeWord) -> Result<(), Stop> {
         let number = self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
         let unit = self.state.modal.unit;
@@ -255,8 +257,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// Refuses a place along an axis where it is not known how far the work offset in force is from that of the part's zero: one of
-    /// them is set to machine coordinates, the other stands where nobody said.
+    /// Refuses a place along an axis where it is not known how far the work offset in force is from that of
+    /// the part's zero: one of them is set to machine coordinates, the other stands where nobody said.
     pub fn check_offset(&self, axis: usize) -> Result<(), Stop> {
         let Some((first, at_first)) = self.zero_set.filter(|_| !self.offsets_known) else { return Ok(()) };
         let frame = &self.state.frame;

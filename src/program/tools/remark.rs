@@ -1,4 +1,5 @@
-//! Comments in which post processors describe a tool, such as `T1 D=6. CR=0.5 - ZMIN=-3. - bull nose end mill`.
+//! Comments in which post processors describe a tool, such as
+//! `T1 D=6. CR=0.5 - ZMIN=-3. - bull nose end mill`.
 
 use cutter::{AptWords, Cutter};
 
@@ -63,8 +64,8 @@ pub(crate) fn may_describe_a_tool(text: &str) -> bool {
     begins_with_t || behind(&text.to_ascii_uppercase(), &DIAMETER).next().is_some()
 }
 
-/// What a comment says of a cutter: a diameter, a corner radius, and whether it is a ball. `unit` is that of the program, mm;
-/// `None` where the program counts in both units.
+/// What a comment says of a cutter: a diameter, a corner radius, and whether it is a ball. `unit` is that of
+/// the program, mm; `None` where the program counts in both units.
 pub fn cutter_of_remark(text: &str, unit: Option<f64>) -> Said {
     if let Some(words) = text.strip_prefix("CUTTER/") {
         let reason = || format!("`{text}` makes no cutter");
@@ -148,8 +149,8 @@ fn end_mill(diameter: f64, corner: f64) -> Option<Cutter> {
     .ok()
 }
 
-/// The cutter of the words of CUTTER in APT: diameter, corner radius, and its centre, two angles and a length where they are
-/// given. mm and degrees. `None` where they make no cutter.
+/// The cutter of the words of CUTTER in APT: diameter, corner radius, and its centre, two angles and a length
+/// where they are given. mm and degrees. `None` where they make no cutter.
 fn cutter_of_words(words: &str) -> Option<Cutter> {
     /// Programs round to four decimals, mm.
     const TOUCH: f64 = 2e-4;
@@ -220,8 +221,8 @@ enum Unit {
     MayBeInch,
 }
 
-/// The length that a text begins with, mm: a number, or a whole number and a fraction, and its unit. `None` where anything else is
-/// joined to it.
+/// The length that a text begins with, mm: a number, or a whole number and a fraction, and its unit. `None`
+/// where anything else is joined to it.
 fn plain_length(text: &str, unit: Option<f64>) -> Option<f64> {
     let (number, is_fraction, rest) = number_at(text)?;
     let (said, rest) = unit_at(rest);

@@ -59,8 +59,8 @@ impl ToolTable {
         Ok(Self { tools })
     }
 
-    /// The tools of a table of LinuxCNC in mm, as far as their remarks do not name another kind of tool than an end mill: a ball
-    /// by the word, a corner radius as `CR=1`, else flat.
+    /// The tools of a table of LinuxCNC in mm, as far as their remarks do not name another kind of tool than
+    /// an end mill: a ball by the word, a corner radius as `CR=1`, else flat.
     ///
     /// # Errors
     /// [`ProgramError`] at the first word that is wrong.
@@ -103,7 +103,8 @@ struct Doubt {
 const MOST_DOUBTS: usize = 20;
 
 impl Described {
-    /// What a program says. A comment without a number is about the only tool in use. Where two comments differ, none counts.
+    /// What a program says. A comment without a number is about the only tool in use. Where two comments
+    /// differ, none counts.
     pub fn of(program: &Program) -> Self {
         let used = program.tools_in_use();
         let unit = (!program.both_units).then_some(program.unit);

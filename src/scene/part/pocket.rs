@@ -1,5 +1,5 @@
-//! A pocket as the part of a scene: its region from a drawing or from points, its open sides, what was cleared before, and the
-//! floor that is measured.
+//! A pocket as the part of a scene: its region from a drawing or from points, its open sides, what was
+//! cleared before, and the floor that is measured.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;
@@ -22,7 +22,8 @@ const SURFACE: &str = "pocket";
 /// Share of the chord tolerance that drawings are flattened to: passes have the rest ...
 const OF_CHORD: f64 = 0.5;
 
-/// ... and no more than this share of the gouge tolerance: the bounds of walls have what chords are off the curves.
+/// ... and no more than this share of the gouge tolerance: the bounds of walls have what chords are off the
+/// curves.
 const OF_GOUGE: f64 = 0.1;
 
 /// The distance within which the chords of drawings lie off their curves, mm.
@@ -277,7 +278,8 @@ fn check(
     }
 }
 
-/// How wide the strip of floor beside walls is that is not measured, mm: what stands there is told by the walls.
+/// How wide the strip of floor beside walls is that is not measured, mm: what stands there is told by the
+/// walls.
 pub fn unmeasured_beside_walls(chord_tolerance: f64, radius: f64) -> f64 {
     CHORDS_FROM_WALLS * chord_tolerance + RADIUS_FROM_WALLS * radius
 }
@@ -502,7 +504,8 @@ mod tests {
         }
     }
 
-    /// A ball that fits a slot by two hundredths fits, though no floor is left to be measured; in a narrower one it does not.
+    /// A ball that fits a slot by two hundredths fits, though no floor is left to be measured; in a narrower
+    /// one it does not.
     #[test]
     fn a_cutter_that_fits_is_not_said_to_fit_nowhere() {
         let refused = |width: f64| {

@@ -60,8 +60,8 @@ impl<T: Real> Chooser<T> {
     }
 
     /// Marks for each square those of `all` that may be lowest somewhere in it and below its stock, and
-    /// counts them. `margin` is added to every bound; `judging` compares the marked moves of a short list each with
-    /// each.
+    /// counts them. `margin` is added to every bound; `judging` compares the marked moves of a short list
+    /// each with each.
     #[inline(always)]
     pub fn choose<S: Sweep<T>, const Q: usize>(
         &mut self,
@@ -304,8 +304,9 @@ fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
     (least, bits(&lanes).trailing_zeros() as usize % LANES)
 }
 
-/// The planes of chunk `k`, and what its moves have to do with their neighbours; the lowest that pass all of the
-/// square, the distance from their track being no more than the root of `within`, enter `best`. All in one loop: short ones do not become vector code.
+/// The planes of chunk `k`, and what its moves have to do with their neighbours; the lowest that pass all of
+/// the square, the distance from their track being no more than the root of `within`, enter `best`. All in
+/// one loop: short ones do not become vector code.
 #[inline(always)]
 fn planes_of<T: Real, S: Sweep<T>>(
     sweep: &S,

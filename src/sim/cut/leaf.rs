@@ -35,12 +35,13 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         [nx, ny]: [usize; 2],
     ) {
         let infinite = T::of(f64::INFINITY);
-        // A copy: numbers that loops read through a reference keep their branches, and so become no vector code.
+        // A copy: numbers that loops read through a reference keep their branches, and so become no vector
+        // code.
         let sweep = self.sweep;
         let first = self.square_at([i, j], [1, 1]);
         let diagonal = (x[CELLS - 1] * x[CELLS - 1] + y[CELLS - 1] * y[CELLS - 1]).sqrt();
-        // Through arrays of a fixed length: loops over those become vector code. Read long before they are needed:
-        // vectors of what was just written in parts have to wait for it.
+        // Through arrays of a fixed length: loops over those become vector code. Read long before they are
+        // needed: vectors of what was just written in parts have to wait for it.
         let mut stored = [f32::NEG_INFINITY; CELLS];
         let (stored_rows, _) = stored.as_chunks_mut::<N>();
         let rows = self.tile.rows[j..j + ny].iter().zip(stored_rows);

@@ -166,7 +166,8 @@ fn evaluations_hardly_grow_with_the_moves() {
     assert!(per_cell(0.5) < 4.0 && per_cell(0.05) < 8.0, "{} {}", per_cell(0.5), per_cell(0.05));
 }
 
-/// Loops over cells are vector code for every family: where those of one are not, it is two to five times as slow.
+/// Loops over cells are vector code for every family: where those of one are not, it is two to five times as
+/// slow.
 #[test]
 #[ignore = "times: every night"]
 fn every_family_is_cut_in_vector_code() {

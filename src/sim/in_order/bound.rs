@@ -12,9 +12,9 @@ pub(super) const CHILDREN: usize = 16;
 /// move could be left out that is lower than its bound by rounding.
 const SLACK: f64 = 1.0e-9;
 
-/// Steepest track along which a cutter is swept by the formulas for vectors. Their error grows with the slope:
-/// 1e-12 mm at this one for a ball of 10 mm, and hundreds of times the tolerance on the steepest tracks
-/// there are.
+/// Steepest track along which a cutter is swept by the formulas for vectors. Their error grows with the
+/// slope: 1e-12 mm at this one for a ball of 10 mm, and hundreds of times the tolerance on the steepest
+/// tracks there are.
 const GENTLE: f64 = 100.0;
 
 /// Planes above the heights of the children of a node: value at the child's middle, slopes along x

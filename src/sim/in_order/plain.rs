@@ -13,7 +13,8 @@ use work::monitor::Monitor;
 /// [`Removal::rapid_contacts`].
 ///
 /// # Errors
-/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor says so.
+/// [`CutError::Path`] where the path is no path of upright tools; [`CutError::Cancelled`] when the monitor
+/// says so.
 #[doc(hidden)]
 pub fn cut_in_order_plain(
     stock: ZMap,

@@ -78,8 +78,8 @@ fn milling_in_passes_agrees_with_the_plain_loop() {
     }
 }
 
-/// Moves along the axes and along sides of triangles of 3, 4 and 5, over cells of the same lattice: many lie on
-/// the rim of the cutter, and whether it reaches them is a matter of rounding.
+/// Moves along the axes and along sides of triangles of 3, 4 and 5, over cells of the same lattice: many lie
+/// on the rim of the cutter, and whether it reaches them is a matter of rounding.
 #[test]
 fn cells_on_the_rim_are_cut_where_the_closed_forms_say_so() {
     let mut rng = Rng::new(33);

@@ -16,7 +16,8 @@ const TOLERANCE: f64 = 1e-11;
 /// The entry into the tool is found to this distance from it, mm: some units of rounding.
 const TOUCHING: f64 = 1e-13;
 
-/// Up to this coordinate, mm, that holds; what lies farther off is rounded in proportion, and all of these distances grow as much.
+/// Up to this coordinate, mm, that holds; what lies farther off is rounded in proportion, and all of these
+/// distances grow as much.
 const NEAR_ORIGIN: f64 = 1e3;
 
 /// Steps of Newton's method, which needs three to eight; corners and grazing rays more.

@@ -1,10 +1,11 @@
 //! All moves of a path as solids, and the search tree over them.
 //!
-//! The tree is built over the track of one point of the tool, the middle of its corner, which a turning
-//! axis moves least; long and fast-turning moves stand in it in parts. Each box also has a mean tool axis
-//! and how far others in it lean away from that. The tool in the middle of a box, with its mean axis, then
-//! bounds the distance from all tools in the box: by its supporting plane over the sides of the box, or over the thinnest
-//! slab that holds what stands in it, and by how far a leaning axis turns that plane toward the place.
+//! The tree is built over the track of one point of the tool, the middle of its corner, which a turning axis
+//! moves least; long and fast-turning moves stand in it in parts. Each box also has a mean tool axis and how
+//! far others in it lean away from that. The tool in the middle of a box, with its mean axis, then bounds the
+//! distance from all tools in the box: by its supporting plane over the sides of the box, or over the
+//! thinnest slab that holds what stands in it, and by how far a leaning axis turns that plane toward the
+//! place.
 
 use super::{Motion, Nearest, OppositeAxes, below};
 use cutter::Solid;
@@ -29,12 +30,13 @@ const LEAF: u32 = 2;
 /// Relative rounding of an axis that is kept in f32.
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
-/// Bytes a move, and at most a part while the tree grows: the part twice, its box three times, the tree and what it is made from.
+/// Bytes a move, and at most a part while the tree grows: the part twice, its box three times, the tree and
+/// what it is made from.
 const BYTES_PER_MOTION: u64 = (size_of::<Motion>() + size_of::<u32>()) as u64;
 const BYTES_PER_PART: u64 = 240;
 
-/// Axes that differ from their mean by this chord or less lie in a convex cone (half a right angle to each side is the
-/// chord of 1.41).
+/// Axes that differ from their mean by this chord or less lie in a convex cone (half a right angle to each
+/// side is the chord of 1.41).
 const WIDEST_CONE: f64 = 1.4;
 
 /// A place nearest to one of many moves.
@@ -57,8 +59,8 @@ struct Summary {
     first: u32,
 }
 
-/// All pivots of a box lie between two planes, which box sides askew to their surface are far from telling: no farther than `half`, mm,
-/// from its middle along `across`.
+/// All pivots of a box lie between two planes, which box sides askew to their surface are far from telling:
+/// no farther than `half`, mm, from its middle along `across`.
 #[derive(Debug, Clone, Copy)]
 struct Slab {
     across: [f32; 3],
@@ -167,9 +169,9 @@ impl SweptMoves {
         self.tree = Some(tree);
     }
 
-    /// The boxes as the tree is built over: tools that lean quite differently far apart, so that they do not share nodes
-    /// until its top. Such neighbours (passes fed forth and back with a lead, both sides of a blade) would leave each
-    /// other's boxes without a common axis to speak of.
+    /// The boxes as the tree is built over: tools that lean quite differently far apart, so that they do not
+    /// share nodes until its top. Such neighbours (passes fed forth and back with a lead, both sides of a
+    /// blade) would leave each other's boxes without a common axis to speak of.
     fn apart_by_axis(&self, parts: &[MovePart], boxes: &[Extent]) -> Vec<Extent> {
         let whole = boxes.iter().fold(Extent::NOTHING, |all, one| all.with(one));
         let apart = 2.0 * (whole.max[0] - whole.min[0]) + self.solid.radius() as f32;
@@ -254,7 +256,8 @@ impl SweptMoves {
         Paired::from_values(&parallel::map(tree.nodes_len(), slab))
     }
 
-    /// How far the pivots of a node lie along a direction from the middle of its box at most, which has these half sides.
+    /// How far the pivots of a node lie along a direction from the middle of its box at most, which has these
+    /// half sides.
     #[inline]
     fn spread(&self, index: usize, along: &Vector3, half: [f64; 3]) -> f64 {
         let within = |v: &Vector3| v.x.abs() * half[0] + v.y.abs() * half[1] + v.z.abs() * half[2];
@@ -424,9 +427,10 @@ fn cell_of(axis: &Vector3) -> usize {
     (2 * face + usize::from(axis[face] < 0.0)) * 9 + 3 * third(beside[0]) + third(beside[1])
 }
 
-/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box, seen from its middle: all of them
-/// lie within the radius of a cone around that axis, which is convex. `away` is the way from the middle to the place, `rho` across the
-/// axis and `along` it; `moved` tells how far along a direction they may lie from the middle.
+/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box, seen
+/// from its middle: all of them lie within the radius of a cone around that axis, which is convex. `away` is
+/// the way from the middle to the place, `rho` across the axis and `along` it; `moved` tells how far along a
+/// direction they may lie from the middle.
 #[inline]
 fn in_cone(
     radius: f64,

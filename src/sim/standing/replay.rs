@@ -1,9 +1,10 @@
 //! One tile of the stock: the program replayed on it, and how near the holder comes to what stands.
 //!
-//! The surface that an upright cutter sweeps along a straight move is a convex function of x and y. So over a cell it
-//! is no higher than at the highest of the four corners: where a move sweeps all four, nothing above that is left. A plunge
-//! cuts before its holder comes. On every other move the stock before the move counts for the bound. For the distance that is
-//! reached, a place counts just before the cutter gets there, and with what is left of it after the move.
+//! The surface that an upright cutter sweeps along a straight move is a convex function of x and y. So over a
+//! cell it is no higher than at the highest of the four corners: where a move sweeps all four, nothing above
+//! that is left. A plunge cuts before its holder comes. On every other move the stock before the move counts
+//! for the bound. For the distance that is reached, a place counts just before the cutter gets there, and
+//! with what is left of it after the move.
 
 use geometry::Point3;
 use work::monitor::{Cancelled, Monitor, check};
@@ -13,7 +14,8 @@ use super::super::swept::swept_height;
 use super::super::track::{Track, larger, smaller};
 use super::{NearStanding, Pending, Replayed, Section, Task};
 
-/// Cells along the side of a tile. Fewer make more tiles, each with its own replay; more are replayed for nothing.
+/// Cells along the side of a tile. Fewer make more tiles, each with its own replay; more are replayed for
+/// nothing.
 pub(super) const TILE: usize = 32;
 
 /// Cells along the side of a block of cells.
@@ -183,8 +185,8 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// No stock in a square, up to `height`, is nearer to a section on a move than this. The move is taken in pieces, each
-    /// with its lowest tip.
+    /// No stock in a square, up to `height`, is nearer to a section on a move than this. The move is taken in
+    /// pieces, each with its lowest tip.
     fn bound(&self, section: &Section, track: &Track, square: Square, height: f64, pieces: f64) -> f64 {
         if height == f64::NEG_INFINITY {
             return f64::INFINITY;
@@ -206,8 +208,8 @@ impl<'a> Replay<'a> {
         least
     }
 
-    /// Takes the distances that a move reaches at the corners of the open cells, where the tool stands at the given
-    /// places.
+    /// Takes the distances that a move reaches at the corners of the open cells, where the tool stands at the
+    /// given places.
     fn reach(&mut self, k: u32, open: &[Open], places: impl Fn(&Section, &Point3) -> Vec<Standing>) {
         let bottom = self.task.stock.bounds().min.z;
         for &(number, cell) in open {

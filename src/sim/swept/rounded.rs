@@ -1,8 +1,9 @@
-//! Bull nose, taper and any other profile: the one-dimensional convex problem of the cutter's place on its track.
+//! Bull nose, taper and any other profile: the one-dimensional convex problem of the cutter's place on its
+//! track.
 //!
-//! With a = s − σ the distance of the point ahead of the axis, w across, ρ = √(a² + w²), and m >= 0
-//! the slope of the track, the lowest cut is where m = f′(ρ)·a/ρ, or at the end of the track, or
-//! where the cutter ends. The profile itself finds that place ([`Profile::ahead`](cutter::Profile::ahead)).
+//! With a = s − σ the distance of the point ahead of the axis, w across, ρ = √(a² + w²), and m >= 0 the slope
+//! of the track, the lowest cut is where m = f′(ρ)·a/ρ, or at the end of the track, or where the cutter ends.
+//! The profile itself finds that place ([`Profile::ahead`](cutter::Profile::ahead)).
 
 use super::{Touch, TouchedBy};
 use crate::form::Form;

@@ -1,7 +1,7 @@
 //! Where samples stand: bricks of 8 × 8 × 8, in blocks of 8 × 8 × 8 bricks, where the surface passes.
 //!
-//! A sample keeps its distance in 16 bits and its nearest move as an index into the brick's own short list: half of what
-//! 32 bits would take.
+//! A sample keeps its distance in 16 bits and its nearest move as an index into the brick's own short list:
+//! half of what 32 bits would take.
 
 use super::cube::Cube;
 use crate::NOT_CUT;

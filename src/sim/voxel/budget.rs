@@ -1,7 +1,7 @@
 //! The memory that bricks may take while a stock is divided.
 //!
-//! Every brick counts before it is kept, and goes on counting beyond the limit. So the voxel that is said to fit follows from
-//! the true number.
+//! Every brick counts before it is kept, and goes on counting beyond the limit. So the voxel that is said to
+//! fit follows from the true number.
 
 use super::bricks::{BRICK, Brick};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -77,8 +77,8 @@ impl Corners {
         self.distances.iter().enumerate().map(|(k, d)| u8::from(*d < 0.0) << k).sum()
     }
 
-    /// The middle between the two places where the surface crosses the edges from a corner inside along a face square to
-    /// `axis`, from the least corner, in cells. It stays off the corners.
+    /// The middle between the two places where the surface crosses the edges from a corner inside along a
+    /// face square to `axis`, from the least corner, in cells. It stays off the corners.
     pub(super) fn beside(&self, corner: usize, axis: usize) -> Vector3 {
         let mut place = Vector3::from_fn(|i, _| (corner >> i & 1) as f64);
         for along in (0..3).filter(|i| *i != axis) {

@@ -126,8 +126,8 @@ impl Divider<'_> {
         self.look(&centre, half, SURE, &parent.parts, parent.stock, scratch, kept)
     }
 
-    /// Bounds within the cube of half side `half` around `centre`; `kept` becomes what may be nearest in it. A
-    /// cube more than `beyond` outside the stock is not looked at any further.
+    /// Bounds within the cube of half side `half` around `centre`; `kept` becomes what may be nearest in it.
+    /// A cube more than `beyond` outside the stock is not looked at any further.
     pub(super) fn look(
         &self,
         centre: &Point3,

@@ -1,7 +1,7 @@
 //! Cuts a stock into voxels of any size that the memory allows. mm.
 //!
-//! Enters: stock, tool and path, made ready once. Leaves: [`Voxels`], or how much memory they would take and the size that
-//! fits.
+//! Enters: stock, tool and path, made ready once. Leaves: [`Voxels`], or how much memory they would take and
+//! the size that fits.
 
 use super::bricks::{Block, Brick, Bricks, Lattice};
 use super::budget::Budget;

@@ -1,7 +1,7 @@
 //! Moves in groups of those that follow each other, so that a large cube need not look at each.
 //!
-//! A group has the pose in its middle. No place of the tool on any of its moves is farther than its spread from the same place of
-//! the tool there, so that its distance differs from that of the pose by no more.
+//! A group has the pose in its middle. No place of the tool on any of its moves is farther than its spread
+//! from the same place of the tool there, so that its distance differs from that of the pose by no more.
 
 use cutter::Solid;
 use geometry::Point3;
@@ -96,8 +96,8 @@ impl Groups {
         &self.parts.all[(first + (end - first) / 2) as usize]
     }
 
-    /// How far all its moves are from `q` at least where that may be below `limit`, with a plane below that within `reach`, and how
-    /// far they spread.
+    /// How far all its moves are from `q` at least where that may be below `limit`, with a plane below that
+    /// within `reach`, and how far they spread.
     pub(super) fn tangent(&self, group: Group, q: &Point3, reach: f64, limit: f64) -> Option<(Tangent, f64)> {
         let pose = group.level.checked_sub(1).map(|above| &self.levels[above as usize][group.at as usize]);
         let (part, spread) = match pose {

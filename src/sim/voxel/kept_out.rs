@@ -1,10 +1,11 @@
 //! Proof that rapid moves of any tool axis stay out of what stands when they come.
 //!
-//! A place is in stock on a move if it lies inside of the stock and of the tool, and outside of all that swept before. In a
-//! cube each of these depths has an upper bound that is linear in the cube, or convex and so below its values at the
-//! corners. Where one is a touch at all corners, or the mean of two of them is, no place is in stock: the mean tells
-//! surfaces that lie on one another, as those of a tool that leaves where it has cut. Cubes that this does not show are
-//! divided, down to a share of a touch. Moves that cannot matter in a cube are not handed on to its parts.
+//! A place is in stock on a move if it lies inside of the stock and of the tool, and outside of all that
+//! swept before. In a cube each of these depths has an upper bound that is linear in the cube, or convex and
+//! so below its values at the corners. Where one is a touch at all corners, or the mean of two of them is, no
+//! place is in stock: the mean tells surfaces that lie on one another, as those of a tool that leaves where
+//! it has cut. Cubes that this does not show are divided, down to a share of a touch. Moves that cannot
+//! matter in a cube are not handed on to its parts.
 
 use super::engine::VoxelEngine;
 use super::moves::{LOOSE, Tangent};
@@ -52,8 +53,8 @@ fn is_touch(a: &Corners, b: &Corners) -> bool {
 }
 
 impl VoxelEngine<'_> {
-    /// The first rapid move that certainly is in stock when it comes, or else the first that is not shown to stay out; `None`
-    /// where all do. The cutter may stray from the path by `strays`, mm.
+    /// The first rapid move that certainly is in stock when it comes, or else the first that is not shown to
+    /// stay out; `None` where all do. The cutter may stray from the path by `strays`, mm.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -186,8 +187,8 @@ impl VoxelEngine<'_> {
         Seen::Divided(parts, rapids.iter().map(|(part, _)| *part).collect())
     }
 
-    /// Whether a part of a rapid move certainly is in stock at the middle of a cube, or halfway between its own surface and
-    /// that of what stands there.
+    /// Whether a part of a rapid move certainly is in stock at the middle of a cube, or halfway between its
+    /// own surface and that of what stands there.
     fn meets(&self, part: u32, swept: &[(u32, Tangent)], piece: &Piece, strays: f64) -> Option<Seen> {
         let tool = |q: &Point3| self.parts.distance(&self.parts.all[part as usize], q, f64::INFINITY);
         let before = &swept[..swept.partition_point(|(p, _)| *p < part)];

@@ -1,11 +1,12 @@
-//! Where a line first leaves the material: found in the samples, then exactly by the moves that are nearest around.
+//! Where a line first leaves the material: found in the samples, then exactly by the moves that are nearest
+//! around.
 //!
 //! # The bound
-//! Of all moves only those are asked that are the nearest at a corner of the cell. Another one may cut deeper in between, but
-//! the distance from a tool in one pose is bent by no more than its sharpest radius r: where it comes down to d between samples
-//! `p` apart, linear interpolation of samples that are no farther from it gives no more than `d + p²/4r`. So below where the
-//! interpolated distance is that, all is material for certain. A tool with a sharp edge is nearer to each corner than the way
-//! there, √3/2 p at most.
+//! Of all moves only those are asked that are the nearest at a corner of the cell. Another one may cut deeper
+//! in between, but the distance from a tool in one pose is bent by no more than its sharpest radius r: where
+//! it comes down to d between samples `p` apart, linear interpolation of samples that are no farther from it
+//! gives no more than `d + p²/4r`. So below where the interpolated distance is that, all is material for
+//! certain. A tool with a sharp edge is nearer to each corner than the way there, √3/2 p at most.
 
 use super::bricks::{Lattice, STEPS};
 use super::engine::VoxelEngine;
@@ -14,8 +15,9 @@ use super::voxels::Voxels;
 use crate::NOT_CUT;
 use geometry::{Point3, Vector3};
 
-/// A cell is looked at this share of the line's way through it from both of its ends, and in the middle: on its faces the
-/// samples of one cell say what those of the next do, so that a cell with the surface cannot be stepped over.
+/// A cell is looked at this share of the line's way through it from both of its ends, and in the middle: on
+/// its faces the samples of one cell say what those of the next do, so that a cell with the surface cannot be
+/// stepped over.
 const FROM_ENDS: f64 = 1e-6;
 
 /// Steps back to where all is material, in voxels, and how many there are at most.
@@ -29,7 +31,8 @@ const REACHED: f64 = 1e-9;
 /// Where so much is left, mm, there is no material within a voxel.
 const UNREACHED: f64 = 1e-6;
 
-/// The cut surface's normal is taken this far inside of the material, in voxels: an edge of the tool has many itself.
+/// The cut surface's normal is taken this far inside of the material, in voxels: an edge of the tool has many
+/// itself.
 const BENEATH: f64 = 0.01;
 
 /// What samples are off besides rounding, mm: turning balls run on chords.
@@ -48,7 +51,8 @@ pub struct LineExit {
     pub uncertain: f64,
 }
 
-/// The cell around a place: the distance of the material by trilinear interpolation, mm, and what is nearest at its corners.
+/// The cell around a place: the distance of the material by trilinear interpolation, mm, and what is nearest
+/// at its corners.
 struct Around {
     distance: f64,
     cut_by: [u32; 8],
@@ -78,7 +82,8 @@ impl Voxels {
     }
 }
 
-/// Where the line `point + s normal` is looked at from `low` to `high`: at both limits, and in every cell that it passes.
+/// Where the line `point + s normal` is looked at from `low` to `high`: at both limits, and in every cell
+/// that it passes.
 fn looks_in_cells(
     lattice: &Lattice,
     point: &Point3,
@@ -101,9 +106,9 @@ fn looks_in_cells(
 }
 
 impl VoxelEngine<'_> {
-    /// The first place at which the line `point + s normal`, from `low` up to `high`, leaves what [`VoxelEngine::cut`] of the
-    /// same engine has left through a cut; `low` where it is outside from the beginning. `None` where it does not, or
-    /// leaves through the stock's own surface.
+    /// The first place at which the line `point + s normal`, from `low` up to `high`, leaves what
+    /// [`VoxelEngine::cut`] of the same engine has left through a cut; `low` where it is outside from the
+    /// beginning. `None` where it does not, or leaves through the stock's own surface.
     ///
     /// # Tolerance
     /// [`LineExit::uncertain`], to one side; to the other 1e-5 mm.
@@ -139,7 +144,8 @@ impl VoxelEngine<'_> {
         None
     }
 
-    /// Where a line leaves what these moves leave, within a voxel of a guess, and how the material lies there.
+    /// Where a line leaves what these moves leave, within a voxel of a guess, and how the material lies
+    /// there.
     fn root(&self, point: &Point3, normal: &Vector3, guess: f64, pitch: f64, cut_by: &[u32]) -> (f64, Foot) {
         let (mut low, mut high) = (guess - pitch, guess + pitch);
         let mut s = guess;

@@ -4,13 +4,14 @@
 //! A move whose axis stands fixed sweeps a convex solid, and the signed distance from a convex solid is a
 //! convex function of the place: it lies above each of its tangent planes, and inside a cube below the
 //! greatest of its values at the corners. Where the axis turns, a tool that keeps the mean axis stands in for
-//! the move: it slides along the chord of the curve along which the tool sees the cube's centre run. From both
-//! tools that centre is seen at spots no farther apart than that curve leaves its chord, a place e beside it
-//! by up to half the turn times e more, and a distance differs by no more than that. A solid of several
-//! pieces is not convex: there a distance changes by no more than the place moves.
+//! the move: it slides along the chord of the curve along which the tool sees the cube's centre run. From
+//! both tools that centre is seen at spots no farther apart than that curve leaves its chord, a place e
+//! beside it by up to half the turn times e more, and a distance differs by no more than that. A solid of
+//! several pieces is not convex: there a distance changes by no more than the place moves.
 //!
-//! The tool that keeps the mean axis slides along a chord, so that the slack is of second order in the turn. With the mean
-//! axis alone it would be of first order. Distances at corners must not be capped: a capped distance is not convex.
+//! The tool that keeps the mean axis slides along a chord, so that the slack is of second order in the turn.
+//! With the mean axis alone it would be of first order. Distances at corners must not be capped: a capped
+//! distance is not convex.
 
 use super::slide::{StandIn, slide};
 use crate::solid::{Motion, Nearest, OppositeAxes, below};
@@ -30,8 +31,8 @@ const WIDEST_TURN: f64 = 0.02;
 /// How exact distances from sliding tools are, mm.
 const EXACT: f64 = 1e-9;
 
-/// How loose bounds over a cube may be, as a share of it, where they only choose moves. Less costs looks at each move, more
-/// keeps moves.
+/// How loose bounds over a cube may be, as a share of it, where they only choose moves. Less costs looks at
+/// each move, more keeps moves.
 pub(super) const LOOSE: f64 = 0.02;
 
 /// Parts of one move at most.
@@ -47,8 +48,8 @@ pub(super) struct MotionPart {
     /// The tip at the begin, and its way.
     tip: Point3,
     tip_way: Vector3,
-    /// The tool with the mean axis, the middle of its ball or corner on the chord: exact where the axis stands
-    /// fixed.
+    /// The tool with the mean axis, the middle of its ball or corner on the chord: exact where the axis
+    /// stands fixed.
     plain: StandIn,
     /// Half the angle by which the axis turns, rad, and about what.
     half_turn: f64,
@@ -194,8 +195,8 @@ impl MotionParts {
         &self.motions[index as usize]
     }
 
-    /// When on a move, from 0 to 1, the tool first comes within `near` of `q`, found to `tolerance` mm by stepping over
-    /// times in which it cannot; 1 where it never does.
+    /// When on a move, from 0 to 1, the tool first comes within `near` of `q`, found to `tolerance` mm by
+    /// stepping over times in which it cannot; 1 where it never does.
     pub(super) fn first_within(&self, index: u32, q: &Point3, near: f64, tolerance: f64, most: usize) -> f64 {
         let motion = &self.motions[index as usize];
         let (begin, end) = (motion.at(0.0), motion.at(1.0));
@@ -214,16 +215,16 @@ impl MotionParts {
         t
     }
 
-    /// Whether the tool is one convex piece that is nowhere wider than at its top: drawn out along its axis it comes to no
-    /// new place below where its top was.
+    /// Whether the tool is one convex piece that is nowhere wider than at its top: drawn out along its axis
+    /// it comes to no new place below where its top was.
     pub(super) fn is_widest_on_top(&self) -> bool {
         let (radius, [_, top]) = (self.solid.radius(), self.solid.heights());
         self.solid.is_convex() && self.solid.outline_foot(radius, top).distance.abs() < EXACT
     }
 
-    /// Whether a tool that is nowhere wider than at its top comes on `later`, on which it does not turn, to no new place within
-    /// `reach` of `q`: where it goes, it has been on `earlier`, no higher along its axis, give or take `near` mm. Of a part
-    /// that turns its ends count.
+    /// Whether a tool that is nowhere wider than at its top comes on `later`, on which it does not turn, to
+    /// no new place within `reach` of `q`: where it goes, it has been on `earlier`, no higher along its axis,
+    /// give or take `near` mm. Of a part that turns its ends count.
     pub(super) fn has_been(
         &self,
         earlier: &MotionPart,
@@ -284,8 +285,8 @@ impl MotionParts {
         below(&self.solid, motion, q, part.range, limit).map(|found| found.distance)
     }
 
-    /// By how much distances from [`MotionPart::plain`] differ within `reach` of `q`, where it is good enough to
-    /// stand in for the part.
+    /// By how much distances from [`MotionPart::plain`] differ within `reach` of `q`, where it is good enough
+    /// to stand in for the part.
     #[inline]
     fn plain_slack(&self, part: &MotionPart, q: &Point3, reach: f64) -> Option<f64> {
         if part.half_turn == 0.0 {
@@ -344,8 +345,8 @@ impl MotionParts {
         Some((Strip { away }, radius))
     }
 
-    /// The distance of the stand-in from `q`, and what bounds it, where it may be below `limit` for the part; loose by the
-    /// share `loose` of `reach`.
+    /// The distance of the stand-in from `q`, and what bounds it, where it may be below `limit` for the part;
+    /// loose by the share `loose` of `reach`.
     #[inline]
     pub(super) fn tangent(
         &self,

@@ -1,5 +1,5 @@
-//! From one cube around the stock down to small ones, for whatever is asked of them: a cube is divided as long
-//! as something in it is open.
+//! From one cube around the stock down to small ones, for whatever is asked of them: a cube is divided as
+//! long as something in it is open.
 
 use super::bricks::BLOCK;
 use super::cube::Cube;

@@ -1,9 +1,9 @@
 //! What each move removes, in the order of the program: a voxel belongs to the first move that covers it.
 //!
-//! A voxel at signed distance d from a move, in voxels, is left by it to the share `½ + d`, within 0 and 1. Of
-//! a voxel each move takes what it leaves less than all before it, so that the volumes add up to all that is
-//! removed. Where a move leaves less of a voxel than the moves before and the stock did, it does cut there, within
-//! half a voxel: the nearest place of its surface lies beyond theirs.
+//! A voxel at signed distance d from a move, in voxels, is left by it to the share `½ + d`, within 0 and 1.
+//! Of a voxel each move takes what it leaves less than all before it, so that the volumes add up to all that
+//! is removed. Where a move leaves less of a voxel than the moves before and the stock did, it does cut
+//! there, within half a voxel: the nearest place of its surface lies beyond theirs.
 
 use super::bricks::Lattice;
 use super::capsule::{Kernel, LANES, Lanes};
@@ -20,9 +20,10 @@ use std::collections::BTreeMap;
 use work::monitor::{Monitor, check};
 use work::{lanes, parallel};
 
-/// By how much a voxel's share may be off where a plane crosses it, in voxels: 0.0478 for one square to the diagonal at a
-/// quarter of a voxel from the middle, 0.0429 square to that of a face, none along the faces. Edges, a tenth of voxel² for
-/// each mm, are paid for by the planes beside them, which cross voxels in many ways.
+/// By how much a voxel's share may be off where a plane crosses it, in voxels: 0.0478 for one square to the
+/// diagonal at a quarter of a voxel from the middle, 0.0429 square to that of a face, none along the faces.
+/// Edges, a tenth of voxel² for each mm, are paid for by the planes beside them, which cross voxels in many
+/// ways.
 pub(super) const PLANE: f64 = 0.048;
 
 /// A touch is told to this share of a voxel.
@@ -37,11 +38,12 @@ const MOST_PLACES: usize = 16;
 /// What a path removes, move by move, by voxels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelRemoval {
-    /// One entry a move of the path. `depth` is that of the deepest voxel it lowered, a voxel at most; `axial` is
-    /// measured along the tool axis, `radial` square to the move and to the axis, 0 of moves along the axis.
+    /// One entry a move of the path. `depth` is that of the deepest voxel it lowered, a voxel at most;
+    /// `axial` is measured along the tool axis, `radial` square to the move and to the axis, 0 of moves along
+    /// the axis.
     pub moves: Vec<MoveRemoval>,
-    /// Rapid moves that cut, in the order of the program; `depth` is at least how far a place that was cut lay
-    /// from the surface that stood.
+    /// Rapid moves that cut, in the order of the program; `depth` is at least how far a place that was cut
+    /// lay from the surface that stood.
     pub rapid_contacts: Vec<RapidContact>,
     /// Bound of the error of the sum of all volumes, mm³.
     pub volume_bound: f64,
@@ -168,16 +170,17 @@ impl Tally {
 }
 
 impl VoxelEngine<'_> {
-    /// What each move removes from what the moves before it left, by voxels of `voxel` mm; rapid moves cut like all
-    /// others and are told. It takes no more memory than the moves and their figures do.
+    /// What each move removes from what the moves before it left, by voxels of `voxel` mm; rapid moves cut
+    /// like all others and are told. It takes no more memory than the moves and their figures do.
     ///
     /// # Errors
-    /// [`VoxelError::Voxel`], also where there are more voxels than can be counted; [`VoxelError::Cancelled`].
+    /// [`VoxelError::Voxel`], also where there are more voxels than can be counted;
+    /// [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// Volumes hold within their bounds where faces bend by no more than their radius within a voxel and nothing
-    /// thinner than a voxel is left standing free. Layers however thin are seen where they are lowered by
-    /// more than [`ENGAGED`]. The bits do not depend on the number of threads.
+    /// Volumes hold within their bounds where faces bend by no more than their radius within a voxel and
+    /// nothing thinner than a voxel is left standing free. Layers however thin are seen where they are
+    /// lowered by more than [`ENGAGED`]. The bits do not depend on the number of threads.
     pub fn removal(&self, voxel: f64, monitor: &dyn Monitor) -> Result<VoxelRemoval, VoxelError> {
         check(monitor)?;
         let Some(lattice) = self.lattice(voxel)? else {
@@ -356,8 +359,8 @@ impl Remover<'_> {
         }
     }
 
-    /// Puts down a place that a rapid move takes.
-    /// As long as it is no nearer than `near`, mm, it takes nothing there, which lies about `depth` deep in what stands.
+    /// Puts down a place that a rapid move takes. As long as it is no nearer than `near`, mm, it takes
+    /// nothing there, which lies about `depth` deep in what stands.
     fn touch(&self, tally: &mut Tally, index: u32, q: &Point3, near: f64, depth: f64) {
         let motion = self.engine.parts.motion(index);
         let tolerance = TOUCH * self.lattice.pitch;

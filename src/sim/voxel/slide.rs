@@ -71,8 +71,8 @@ impl Look {
     }
 }
 
-/// The distance of `q` from all that the tool sweeps, up to `tolerance` mm too great, with a plane below it that
-/// is at most as much too low; `None` if it is not below `limit`.
+/// The distance of `q` from all that the tool sweeps, up to `tolerance` mm too great, with a plane below it
+/// that is at most as much too low; `None` if it is not below `limit`.
 pub(super) fn slide(
     solid: &Solid,
     tool: &StandIn,

@@ -1,11 +1,13 @@
 //! How near shank and holder of a tool with any axes come to the stock that stands when they pass.
 //!
-//! A place stands until the cutter covers it. Cubes around the stock are divided, those first in which the holder may come
-//! nearest. A cube knows the moves on which the holder comes near to it and those on which the cutter does; what a move
-//! covers whole is in nobody's way afterwards. Large cubes know them in groups ([`super::groups`]). A place in its middle that stands when the holder comes gives a distance that is
-//! reached. Supporting planes bound it from below. Of two convex bodies one may shield the other: where the distance from
-//! what is cut, less that from the section, is at most m at all corners of a cube, no place that stands is nearer than -m. So
-//! cubes stay large where a shank follows its cutter along a wall, and are small only beside the nearest places.
+//! A place stands until the cutter covers it. Cubes around the stock are divided, those first in which the
+//! holder may come nearest. A cube knows the moves on which the holder comes near to it and those on which
+//! the cutter does; what a move covers whole is in nobody's way afterwards. Large cubes know them in groups
+//! ([`super::groups`]). A place in its middle that stands when the holder comes gives a distance that is
+//! reached. Supporting planes bound it from below. Of two convex bodies one may shield the other: where the
+//! distance from what is cut, less that from the section, is at most m at all corners of a cube, no place
+//! that stands is nearer than -m. So cubes stay large where a shank follows its cutter along a wall, and are
+//! small only beside the nearest places.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -22,8 +24,8 @@ use motion::Toolpath;
 use work::monitor::{Monitor, check};
 use work::parallel;
 
-/// What a section no wider than the cutter shares with stock less deep than this, mm, is a cusp that it rubs along. Less
-/// finds those; more misses true collisions.
+/// What a section no wider than the cutter shares with stock less deep than this, mm, is a cusp that it rubs
+/// along. Less finds those; more misses true collisions.
 const SHALLOWEST: f64 = 0.01;
 
 /// Times of a touch are found to this, mm.
@@ -32,7 +34,8 @@ const TOUCH: f64 = 1e-4;
 /// Looks at one place for the time of a touch at most.
 const MOST_TOUCHES: usize = 1000;
 
-/// Looks at a move from a cube at most, and after a collision was found. What is left open by then stays in the bound.
+/// Looks at a move from a cube at most, and after a collision was found. What is left open by then stays in
+/// the bound.
 const MOST_LOOKS: u64 = 20_000_000;
 const MOST_LOOKS_COLLIDING: u64 = 2_000_000;
 
@@ -75,8 +78,8 @@ struct Gone {
     whole: u32,
     /// The first that covers its middle, where that was asked for.
     middle: Option<u32>,
-    /// Moves, each with bounds on the distance from what it takes at the corners. Between them their greatest is one, also
-    /// of their sum with a linear function.
+    /// Moves, each with bounds on the distance from what it takes at the corners. Between them their greatest
+    /// is one, also of their sum with a linear function.
     shields: Vec<(u32, [f64; 8])>,
 }
 
@@ -90,16 +93,16 @@ struct Search<'a> {
 }
 
 impl VoxelEngine<'_> {
-    /// How near the sections of `holder` on the way of `path`, that of this engine, come to what its cutter has not yet
-    /// taken, nor others `before`.
+    /// How near the sections of `holder` on the way of `path`, that of this engine, come to what its cutter
+    /// has not yet taken, nor others `before`.
     ///
     /// # Errors
     /// [`VoxelError::Axes`]; [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// See [`StandingClearance::error_bound`]: a twentieth of the clearance and a hundredth of a millimetre at most, unless
-    /// too many cubes leave it open. A section no wider than the cutter counts as 0.01 mm farther away: it rubs along
-    /// cusps. The result does not depend on the number of threads.
+    /// See [`StandingClearance::error_bound`]: a twentieth of the clearance and a hundredth of a millimetre
+    /// at most, unless too many cubes leave it open. A section no wider than the cutter counts as 0.01 mm
+    /// farther away: it rubs along cusps. The result does not depend on the number of threads.
     pub fn holder_clearance(
         &self,
         before: &[(Cutter, Toolpath)],
@@ -218,8 +221,8 @@ impl Search<'_> {
         }
     }
 
-    /// Puts down the cutters' moves that come into a cube, up to move `last`, and tells what they take; `None` where another
-    /// tool took all of it before.
+    /// Puts down the cutters' moves that come into a cube, up to move `last`, and tells what they take;
+    /// `None` where another tool took all of it before.
     fn cut(&self, node: &Node, child: &mut Node, last: u32, divided: &mut Divided) -> Option<Gone> {
         let (middle, half) = (child.middle, child.half);
         let reach = 3f64.sqrt() * half;
@@ -258,7 +261,8 @@ impl Search<'_> {
         (gone.whole > 0).then_some(gone)
     }
 
-    /// Puts down a section's moves that may come near what stands of a cube, and how near they come to its middle.
+    /// Puts down a section's moves that may come near what stands of a cube, and how near they come to its
+    /// middle.
     fn hold(
         &self,
         held: Group,
@@ -311,7 +315,8 @@ impl Search<'_> {
         child.held.push(held);
     }
 
-    /// Takes the distance from the middle of a cube on the move in the middle of a group, where it stands then.
+    /// Takes the distance from the middle of a cube on the move in the middle of a group, where it stands
+    /// then.
     fn reach(&self, held: Group, gone: &mut Gone, child: &Node, divided: &mut Divided) {
         let (groups, rub) = (&self.sections[held.of as usize], self.rubs[held.of as usize]);
         let (parts, part) = (&groups.parts, groups.middle(held));
@@ -337,8 +342,8 @@ impl Search<'_> {
         }
     }
 
-    /// Upper bounds at the corners of a cube on the distance of what the cutter takes on a move before a section comes near
-    /// the cube.
+    /// Upper bounds at the corners of a cube on the distance of what the cutter takes on a move before a
+    /// section comes near the cube.
     fn cut_first(&self, held: Group, index: u32, child: &Node, divided: &mut Divided) -> Option<[f64; 8]> {
         divided.looks += 16;
         let (cutter, section) = (&self.engine.parts, &self.sections[held.of as usize].parts);

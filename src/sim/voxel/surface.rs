@@ -1,10 +1,11 @@
-//! The surface of the material as a closed triangle mesh, by dual contouring: a vertex for each sheet of the surface in a
-//! cell, a quadrilateral around each edge of the lattice on which its sign changes.
+//! The surface of the material as a closed triangle mesh, by dual contouring: a vertex for each sheet of the
+//! surface in a cell, a quadrilateral around each edge of the lattice on which its sign changes.
 //!
-//! Each sheet leaves a cell over pairs of edges on its faces, and the sheet of the next cell goes on over the same pair: two
-//! quadrilaterals share the line between their vertices. Only where two sheets meet twice on one face would four of them share
-//! it; there each pair gets a vertex of its own on the face (`pinches`). So two triangles meet at every edge of the mesh, and
-//! those around a vertex form one ring. Vertices lie on the exact tangent planes of the tool, which keeps ridges sharp.
+//! Each sheet leaves a cell over pairs of edges on its faces, and the sheet of the next cell goes on over the
+//! same pair: two quadrilaterals share the line between their vertices. Only where two sheets meet twice on
+//! one face would four of them share it; there each pair gets a vertex of its own on the face (`pinches`). So
+//! two triangles meet at every edge of the mesh, and those around a vertex form one ring. Vertices lie on the
+//! exact tangent planes of the tool, which keeps ridges sharp.
 
 use super::bricks::{Bricks, Placed, offset, slot_of};
 use super::cells::{Cells, Corners, crossed};
@@ -70,7 +71,8 @@ const HALVINGS: usize = 12;
 /// How much closer to a ridge its planes are taken a second time.
 const CLOSER: f64 = 0.1;
 
-/// Vertices stay so far inside of their cells, as a share of half a cell, that those of neighbours stay apart in f32.
+/// Vertices stay so far inside of their cells, as a share of half a cell, that those of neighbours stay apart
+/// in f32.
 const APART: f64 = 2e-3;
 
 impl VoxelEngine<'_> {
@@ -80,8 +82,8 @@ impl VoxelEngine<'_> {
     /// [`Cancelled`].
     ///
     /// # Tolerance
-    /// Vertices lie on the tangent planes of the tool near them, which is second order in the voxel; on ridges
-    /// on both. None lies outside of the stock. Every edge has two triangles.
+    /// Vertices lie on the tangent planes of the tool near them, which is second order in the voxel; on
+    /// ridges on both. None lies outside of the stock. Every edge has two triangles.
     pub fn surface(&self, voxels: &Voxels, monitor: &dyn Monitor) -> Result<VoxelSurface, Cancelled> {
         let bricks = &voxels.bricks;
         monitor.start("surface of voxels", 3 * bricks.blocks.len() as u64);
@@ -140,8 +142,8 @@ impl VoxelEngine<'_> {
         vertices
     }
 
-    /// The vertex of the sheet that crosses these edges of a cell whose least corner is `low`, what cuts it, and whether it
-    /// stands on a ridge.
+    /// The vertex of the sheet that crosses these edges of a cell whose least corner is `low`, what cuts it,
+    /// and whether it stands on a ridge.
     fn vertex(
         &self,
         low: &Point3,
@@ -204,8 +206,8 @@ impl VoxelEngine<'_> {
         foot
     }
 
-    /// Signed distance of the material near samples that are cut by these moves, its gradient, and which of them it comes
-    /// from.
+    /// Signed distance of the material near samples that are cut by these moves, its gradient, and which of
+    /// them it comes from.
     pub(super) fn foot(&self, q: &Point3, cut_by: &[u32]) -> Foot {
         let mut nearest: Option<(f64, f64, u32)> = None;
         for (k, &index) in cut_by.iter().enumerate() {
@@ -253,8 +255,8 @@ impl Net<'_> {
         Some((held.block, k))
     }
 
-    /// The number of the vertex of the sheet that crosses an edge of the cell whose least sample is `at`, and whether it
-    /// stands on a ridge.
+    /// The number of the vertex of the sheet that crosses an edge of the cell whose least sample is `at`, and
+    /// whether it stands on a ridge.
     fn vertex(&self, at: [u32; 3], edge: usize, here: &Placed<'_>) -> Option<(u32, bool)> {
         let (block, k) = self.cell(at, here)?;
         let found = &self.found[block];
@@ -262,8 +264,8 @@ impl Net<'_> {
         Some((self.firsts[block] + within, found.ridges[within as usize]))
     }
 
-    /// The faces of a block's cells on which two sheets meet twice, with a vertex for each of the two corners inside and what
-    /// cuts it.
+    /// The faces of a block's cells on which two sheets meet twice, with a vertex for each of the two corners
+    /// inside and what cuts it.
     fn pinched(&self, block: usize) -> Vec<(Pinch, Point3, u32)> {
         let mut pinched = Vec::new();
         for placed in self.bricks.of_block(block) {
@@ -343,7 +345,8 @@ impl Net<'_> {
         to.extend(if straight { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] });
     }
 
-    /// The vertices around an edge with those on its pinched faces, one of which is the first; `None` without such a face.
+    /// The vertices around an edge with those on its pinched faces, one of which is the first; `None` without
+    /// such a face.
     fn pinched_ring(
         &self,
         ring: &[([u32; 3], (u32, bool)); 4],

@@ -1,12 +1,13 @@
 //! What a path leaves of a stock and takes from it: volumes between proven bounds. mm, mm³.
 //!
 //! # The bound
-//! The signed distance d from what a move sweeps is a convex function. Over a cube it lies above its tangent plane at the
-//! middle, and below the parallel plane that is as high as d at all corners. So what moves leave of a cube lies within the
-//! upper sides of all upper planes and holds what lies in those of all lower ones: two convex solids, whose volumes have
-//! closed forms. A block's faces are planes; a bar's side lies between two. A cube is divided until both volumes are near
-//! each other. On flat faces and on ridges between them they are equal at once; along bent ones they differ by the second
-//! order of the cube. The distance of any other stock is only known to change by no more than the place moves.
+//! The signed distance d from what a move sweeps is a convex function. Over a cube it lies above its tangent
+//! plane at the middle, and below the parallel plane that is as high as d at all corners. So what moves leave
+//! of a cube lies within the upper sides of all upper planes and holds what lies in those of all lower ones:
+//! two convex solids, whose volumes have closed forms. A block's faces are planes; a bar's side lies between
+//! two. A cube is divided until both volumes are near each other. On flat faces and on ridges between them
+//! they are equal at once; along bent ones they differ by the second order of the cube. The distance of any
+//! other stock is only known to change by no more than the place moves.
 
 use super::bricks::Lattice;
 use super::cube::Cube;
@@ -18,14 +19,16 @@ use crate::stock::{StockSides, corner};
 use geometry::{HalfSpace, Point3, Polytope, Vector3};
 use work::monitor::{Monitor, check};
 
-/// Least cubes along the side of a voxel. More tighten the bound at the tool's sharp edges and take twice as long there.
+/// Least cubes along the side of a voxel. More tighten the bound at the tool's sharp edges and take twice as
+/// long there.
 const FINEST: f64 = 4.0;
 
-/// A cube is not divided where its bounds differ by a layer of so many voxels or less on one of its sides. Less takes
-/// longer, more widens the bounds.
+/// A cube is not divided where its bounds differ by a layer of so many voxels or less on one of its sides.
+/// Less takes longer, more widens the bounds.
 const THIN: f64 = 0.015;
 
-/// Of larger cubes than so many voxels the layer counts on so much only: no single cube may have most of the width.
+/// Of larger cubes than so many voxels the layer counts on so much only: no single cube may have most of the
+/// width.
 const WIDE: f64 = 4.0;
 
 /// More moves than this in one cube: parts of it see fewer, and cost less.
@@ -95,14 +98,16 @@ impl Sums {
 }
 
 impl VoxelEngine<'_> {
-    /// Volumes of what the path leaves and takes. Cubes are divided down to a quarter of `voxel` mm, where they need be.
+    /// Volumes of what the path leaves and takes. Cubes are divided down to a quarter of `voxel` mm, where
+    /// they need be.
     ///
     /// # Errors
-    /// [`VoxelError::Voxel`], also where there are more voxels than can be counted; [`VoxelError::Cancelled`].
+    /// [`VoxelError::Voxel`], also where there are more voxels than can be counted;
+    /// [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// The true volumes lie within the bounds, also those of a [`roughed`](crate::Stock::roughed) block whose surface is
-    /// closed. The bits do not depend on the number of threads.
+    /// The true volumes lie within the bounds, also those of a [`roughed`](crate::Stock::roughed) block whose
+    /// surface is closed. The bits do not depend on the number of threads.
     pub fn volumes(&self, voxel: f64, monitor: &dyn Monitor) -> Result<VoxelVolumes, VoxelError> {
         check(monitor)?;
         self.lattice(voxel)?;
@@ -135,8 +140,8 @@ impl Measure<'_> {
         (self.lattice.place(cube.low) + Vector3::from_element(half), half)
     }
 
-    /// Those of the listed parts that take something of a cube, and their planes; a single one where it takes all. No planes
-    /// where they are too many for a cube that can be divided.
+    /// Those of the listed parts that take something of a cube, and their planes; a single one where it takes
+    /// all. No planes where they are too many for a cube that can be divided.
     fn cut(
         &self,
         listed: &[u32],

@@ -1,11 +1,13 @@
 //! Gaps between passes on a chart that halving intervals of ψ does not find.
 //!
-//! Enters: the contacts of planned passes. Leaves: further short passes along levels of ψ, until no place lies farther
-//! from every contact than half the interval that is allowed there. Halving looks at one level between two others and
-//! takes ψ to rise evenly; around a fold, an extremum or a kink of ψ, and over the tip of a finger of levels, it does not.
+//! Enters: the contacts of planned passes. Leaves: further short passes along levels of ψ, until no place
+//! lies farther from every contact than half the interval that is allowed there. Halving looks at one level
+//! between two others and takes ψ to rise evenly; around a fold, an extremum or a kink of ψ, and over the tip
+//! of a finger of levels, it does not.
 //!
-//! Distances are straight ones in space, mm; of strips that are narrow against the part's radii they are those on the
-//! surface. Only what lies beside a pass is looked at, across it: a part without any pass nearby has no gaps.
+//! Distances are straight ones in space, mm; of strips that are narrow against the part's radii they are
+//! those on the surface. Only what lies beside a pass is looked at, across it: a part without any pass nearby
+//! has no gaps.
 
 use std::collections::HashMap;
 
@@ -17,19 +19,20 @@ use field::ScalarField;
 use geometry::Point3;
 use work::monitor::{self, Monitor};
 
-/// A place is open where the nearest contact is farther away than half the allowed interval by this share: 3 % are 6 % of
-/// the scallop height. Halving has closed what is more than 2 % too wide where ψ is even.
+/// A place is open where the nearest contact is farther away than half the allowed interval by this share:
+/// 3 % are 6 % of the scallop height. Halving has closed what is more than 2 % too wide where ψ is even.
 const SLACK: f64 = 0.03;
 
-/// A gap is worth passes where it opens by this share: 6 % are 12 % of the scallop height. Where less is open straight
-/// distances and the field's own error tell as much.
+/// A gap is worth passes where it opens by this share: 6 % are 12 % of the scallop height. Where less is open
+/// straight distances and the field's own error tell as much.
 const WORTH: f64 = 0.06;
 
-/// Where a measured ridge asked for narrower passes, a place is open, and worth passes, by this share: there calculation and
-/// measurement are known to differ.
+/// Where a measured ridge asked for narrower passes, a place is open, and worth passes, by this share: there
+/// calculation and measurement are known to differ.
 const MEASURED: f64 = 0.01;
 
-/// From a contact, places are looked at across the feed, this share of the interval apart, until one is served.
+/// From a contact, places are looked at across the feed, this share of the interval apart, until one is
+/// served.
 const MARCH: f64 = 0.0625;
 const MOST_MARCHES: usize = 32;
 
@@ -145,8 +148,8 @@ impl Gaps<'_, '_> {
         on.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared()))
     }
 
-    /// Distance of the nearest contact over half the interval that is allowed toward it; `None` where the chart has no
-    /// normal.
+    /// Distance of the nearest contact over half the interval that is allowed toward it; `None` where the
+    /// chart has no normal.
     fn openness(&self, p: &ChartPoint) -> Option<f64> {
         let Some(nearest) = self.nearest(&p.jet.p) else { return Some(f64::INFINITY) };
         let toward = nearest - p.jet.p;
@@ -237,8 +240,8 @@ mod tests {
         }
     }
 
-    /// Where on x passes were added between two that are `wider` times the allowed interval apart, after a measurement that asks
-    /// for another factor at the middle.
+    /// Where on x passes were added between two that are `wider` times the allowed interval apart, after a
+    /// measurement that asks for another factor at the middle.
     fn added(wider: f64, factor: f64, sampling: f64) -> Vec<[f64; 2]> {
         let cutter = Cutter::ball(6.0).unwrap();
         let interval = crate::plane_interval(&cutter, Step::Scallop(HEIGHT));
@@ -268,8 +271,8 @@ mod tests {
         passes.contacts[2..].iter().map(ends).collect()
     }
 
-    /// Two per cent are no gap by calculation. Where a ridge was measured too high they are one, there alone, be the points of
-    /// levels as far apart as they may.
+    /// Two per cent are no gap by calculation. Where a ridge was measured too high they are one, there alone,
+    /// be the points of levels as far apart as they may.
     #[test]
     fn where_ridges_were_measured_too_high_less_is_a_gap() {
         assert_eq!(added(1.02, 1.0, 0.1), Vec::<[f64; 2]>::new());

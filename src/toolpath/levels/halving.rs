@@ -1,10 +1,11 @@
 //! Which level curves become passes, and along which stretches, on a chart or on a mesh.
 //!
-//! Whole passes run along levels that `spacing` has placed. Where the surface or the field asks for
-//! a smaller interval than the levels leave, further passes are put halfway between them, only
-//! along the stretches that need one, and between those again.
+//! Whole passes run along levels that `spacing` has placed. Where the surface or the field asks for a smaller
+//! interval than the levels leave, further passes are put halfway between them, only along the stretches that
+//! need one, and between those again.
 //!
-//! Kinks may be narrower than the points of a curve are apart. So the places between two points are checked too.
+//! Kinks may be narrower than the points of a curve are apart. So the places between two points are checked
+//! too.
 
 use crate::moves::touch::Touch;
 use crate::vocabulary::{Contact, Passes, PlanError};
@@ -15,8 +16,8 @@ use work::monitor::{self, Cancelled, Monitor};
 /// sixty-fourth; only singular points of the field ask for more, and are measured.
 const MOST_HALVINGS: usize = 6;
 
-/// An interval may exceed the allowed one by this share before a further pass is put in: half a per cent is one of the scallop
-/// height. What that leaves above the target is measured and corrected.
+/// An interval may exceed the allowed one by this share before a further pass is put in: half a per cent is
+/// one of the scallop height. What that leaves above the target is measured and corrected.
 const INTERVAL_SLACK: f64 = 0.005;
 
 /// Further passes reach beyond the stretch that needs them by this many allowed intervals, so that
@@ -52,13 +53,14 @@ pub(crate) trait LevelSource: Sync {
     /// What a place allows; `None` where the surface or the function has no direction.
     fn allowed(&self, place: &Self::Place) -> Option<Allowed>;
 
-    /// The least that is allowed from one point of a curve to before the next: kinks may be narrower than points are
-    /// apart.
+    /// The least that is allowed from one point of a curve to before the next: kinks may be narrower than
+    /// points are apart.
     fn least_allowed(&self, from: &Self::Place, _to: &Self::Place) -> Option<Allowed> {
         self.allowed(from)
     }
 
-    /// The pass along a curve, or along a run of its points, in pieces between places where the cutter touches nothing.
+    /// The pass along a curve, or along a run of its points, in pieces between places where the cutter
+    /// touches nothing.
     fn pass(
         &self,
         curve: &Track<Self::Place>,
@@ -81,7 +83,8 @@ pub(crate) trait LevelSource: Sync {
 }
 
 impl<P: Copy> Track<P> {
-    /// The points, the first one again at the end of a closed curve, and the run that is asked for; `None` for a run of nothing.
+    /// The points, the first one again at the end of a closed curve, and the run that is asked for; `None`
+    /// for a run of nothing.
     pub fn opened(&self, run: Option<[usize; 2]>) -> Option<(Vec<P>, [usize; 2])> {
         let closing = self.points.first().filter(|_| self.closed);
         let points: Vec<P> = self.points.iter().chain(closing).copied().collect();
@@ -143,8 +146,9 @@ pub(crate) fn along_and_between<S: LevelSource>(
     Ok(all)
 }
 
-/// Appends passes along the stretches of a level that need one, with their overlap: where points are `needed`, and in any case
-/// at the point nearest to a place that is `distance` mm away, where no other point of the level may lie between.
+/// Appends passes along the stretches of a level that need one, with their overlap: where points are
+/// `needed`, and in any case at the point nearest to a place that is `distance` mm away, where no other point
+/// of the level may lie between.
 pub(crate) fn along_needed<S: LevelSource>(
     source: &S,
     level: f64,
@@ -260,8 +264,8 @@ impl<S: LevelSource> Filler<'_, S> {
         })
     }
 
-    /// The runs of a curve (first and last point) for whose points `width` gives an interval, mm, with their overlap. A
-    /// closed curve is turned to begin outside of any run.
+    /// The runs of a curve (first and last point) for whose points `width` gives an interval, mm, with their
+    /// overlap. A closed curve is turned to begin outside of any run.
     fn stretches(
         &self,
         mut curve: Track<S::Place>,

@@ -24,8 +24,8 @@ use work::monitor::{Cancelled, Monitor};
 /// Grid cells a side on which level curves are found.
 const TRACE_CELLS: usize = 240;
 
-/// Passes are traced beyond the border by this share of their mean interval. A pass outside the border serves inside it from
-/// half of its own interval, which may be wider than the mean.
+/// Passes are traced beyond the border by this share of their mean interval. A pass outside the border serves
+/// inside it from half of its own interval, which may be wider than the mean.
 const BORDER_SHARE: f64 = 0.75;
 
 /// The margin is never more than this share of the chart; it would be where a parametrisation
@@ -374,8 +374,8 @@ impl LevelSource for ChartGuide<'_> {
     }
 }
 
-/// Carries the last piece on by a stretch that begins where it ends, or else begins another one: beyond the border the cutter
-/// may touch nothing for a while, and no move leads from one side of that to the other.
+/// Carries the last piece on by a stretch that begins where it ends, or else begins another one: beyond the
+/// border the cutter may touch nothing for a while, and no move leads from one side of that to the other.
 fn put_on<P>(pieces: &mut Vec<Vec<P>>, stretch: Vec<P>, is_near: &dyn Fn(&P, &P) -> bool) {
     let ends = pieces.last().and_then(|piece| piece.last()).zip(stretch.first());
     let joined = ends.is_some_and(|(last, first)| is_near(last, first));

@@ -1,5 +1,6 @@
-//! Passes as levels of a function on a surface. Enters: the function, on a chart or a mesh, and what step each place allows.
-//! Leaves: passes on whole levels, further ones at halves and quarters where a step is too wide, and short ones in gaps.
+//! Passes as levels of a function on a surface. Enters: the function, on a chart or a mesh, and what step
+//! each place allows. Leaves: passes on whole levels, further ones at halves and quarters where a step is too
+//! wide, and short ones in gaps.
 
 pub mod gaps;
 pub mod halving;

@@ -1,14 +1,16 @@
 //! How far passes are off the feed directions that were asked for.
 //!
-//! Enters: the contacts of all passes in order, each with the direction asked for there, or rows at places of their own ([`Row`]: of
-//! tables, along guides and borders). Leaves: the mean and the greatest angle.
+//! Enters: the contacts of all passes in order, each with the direction asked for there, or rows at places of
+//! their own ([`Row`]: of tables, along guides and borders). Leaves: the mean and the greatest angle.
 //!
-//! Passes are followed from contact to contact, by their tangents at the contacts and by the chords between. Where the angle rises to
-//! its greatest and falls again, both more and more steeply toward and from it (it is concave there), it is nowhere greater by more
-//! than it changes from one of these to the next. Moves of the cutter keep to the pass within the chord tolerance.
+//! Passes are followed from contact to contact, by their tangents at the contacts and by the chords between.
+//! Where the angle rises to its greatest and falls again, both more and more steeply toward and from it (it
+//! is concave there), it is nowhere greater by more than it changes from one of these to the next. Moves of
+//! the cutter keep to the pass within the chord tolerance.
 //!
-//! At a row two passes tell the angle, one on each side, by their nearness (at a border the two nearest): it changes evenly from pass to
-//! pass, to second order. It is known no better than that of the nearest one is off it.
+//! At a row two passes tell the angle, one on each side, by their nearness (at a border the two nearest): it
+//! changes evenly from pass to pass, to second order. It is known no better than that of the nearest one is
+//! off it.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -25,7 +27,8 @@ const OFF: f64 = PI / 180.0;
 /// Contacts nearer than this, mm, have no direction between them.
 const SAME_PLACE: f64 = 1e-6;
 
-/// The other pass beside a row lies within an angle of this cosine straight beyond it, or behind the nearest one.
+/// The other pass beside a row lies within an angle of this cosine straight beyond it, or behind the nearest
+/// one.
 const STRAIGHT: f64 = 0.5;
 
 /// An angle at a place.
@@ -88,7 +91,8 @@ impl Obedience {
     }
 }
 
-/// The angle from an asked tangent to a pass `along` a tangent, as lines, on a surface of unit `normal`: rad, between right angles.
+/// The angle from an asked tangent to a pass `along` a tangent, as lines, on a surface of unit `normal`: rad,
+/// between right angles.
 pub(crate) fn off(along: &Vector3, normal: &Vector3, asked: &Vector3) -> f64 {
     let (across, along) = (asked.cross(along).dot(normal), asked.dot(along));
     (across * if along < 0.0 { -1.0 } else { 1.0 }).atan2(along.abs())
@@ -225,8 +229,8 @@ impl<'a> Beside<'a> {
         turn.abs() > PI
     }
 
-    /// How far the passes beside a row are off what it asks for; `None` where none is within an interval, in the middle of the innermost
-    /// one that closes, and near corners of a curve.
+    /// How far the passes beside a row are off what it asks for; `None` where none is within an interval, in
+    /// the middle of the innermost one that closes, and near corners of a curve.
     fn off(&self, row: &Row) -> Option<Off> {
         let p = row.at.xy();
         let reach = 2.0 * self.near(row, self.grid.nearest(&p)?.segment).allowed();
@@ -314,7 +318,8 @@ mod tests {
         }
     }
 
-    /// Contacts 1 mm apart along x, the fifth and later ones beyond the border, where directions off by given degrees are asked for.
+    /// Contacts 1 mm apart along x, the fifth and later ones beyond the border, where directions off by given
+    /// degrees are asked for.
     fn pass(off: &[Option<f64>]) -> Vec<Contact> {
         let contact = |(k, angle): (usize, &Option<f64>)| Contact {
             asked: angle.map(|a| Vector3::new(a.to_radians().cos(), -a.to_radians().sin(), 0.0)),
@@ -337,7 +342,8 @@ mod tests {
         // By half of what it changes by to the contact, on the chord between: from 12 to 4.5.
         assert!((bound - 7.5).abs() < 1e-9, "{bound}");
         assert!(note(&found.error().unwrap()).unwrap().contains("up to 12 at x 1.0 y 0.0"));
-        // The third place is not asked for, the chords beside it go by their other end, and beyond the border nothing counts.
+        // The third place is not asked for, the chords beside it go by their other end, and beyond the border
+        // nothing counts.
         let found = measure(&[pass(&[Some(0.3), Some(-0.4), None, Some(0.5), Some(70.0)])], &[]);
         let squares = 0.25 * 0.3f64.powi(2)
             + 0.5 * 0.05f64.powi(2)
@@ -395,7 +401,8 @@ mod tests {
             .rows(&FeedDirection::Samples(field))
     }
 
-    /// Rows are compared with passes themselves, near the middle of a turn as well, and all alike whatever their weights.
+    /// Rows are compared with passes themselves, near the middle of a turn as well, and all alike whatever
+    /// their weights.
     #[test]
     fn rows_of_a_table_are_the_measure() {
         let around = |[x, y]: [f64; 2]| [-y, x];
@@ -432,7 +439,8 @@ mod tests {
         assert!(rms < 1e-3 && max < 2e-3 && bound < 1.45, "{rms} {max} {bound}");
     }
 
-    /// On straight passes a guide circle is off by its own angle, all angles equally: π²/12 in the mean square.
+    /// On straight passes a guide circle is off by its own angle, all angles equally: π²/12 in the mean
+    /// square.
     #[test]
     fn a_guide_is_the_measure_of_passes_near_it() {
         let line = |k: i32| {

@@ -1,8 +1,9 @@
 //! A stream function on triangles, on the mesh of a surface or over the plane of a pocket, and its lines.
 //!
-//! Enters: ψ at the vertices and the directions asked for there. Leaves: level curves, or streamlines traced by Runge–Kutta steps
-//! through one seed on each piece of a level; and what the function has at any point of a triangle. A traced line that ends before its
-//! level does, or does not close where that does, is left for the level.
+//! Enters: ψ at the vertices and the directions asked for there. Leaves: level curves, or streamlines traced
+//! by Runge–Kutta steps through one seed on each piece of a level; and what the function has at any point of
+//! a triangle. A traced line that ends before its level does, or does not close where that does, is left for
+//! the level.
 
 use super::halving::Allowed;
 use super::spacing::AllowedStep;
@@ -39,7 +40,8 @@ pub(crate) fn smooth_directions(
     Ok(lines)
 }
 
-/// The function whose levels follow directions, one pass for each 1/`density` mm; `matters` says how much each direction counts.
+/// The function whose levels follow directions, one pass for each 1/`density` mm; `matters` says how much
+/// each direction counts.
 pub(crate) fn along_directions(
     mesh: &FieldMesh,
     lines: &[Line],
@@ -135,8 +137,8 @@ impl<'a> OnTriangles<'a> {
         (sum - normal * normal.dot(&sum)).try_normalize(1e-9)
     }
 
-    /// What each of the first `count` triangles allows in its middle, by what a point is told to allow, and whether the surface is too
-    /// concave there.
+    /// What each of the first `count` triangles allows in its middle, by what a point is told to allow, and
+    /// whether the surface is too concave there.
     pub fn places(
         &self,
         count: usize,

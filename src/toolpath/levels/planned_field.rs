@@ -1,5 +1,5 @@
-//! What passes were planned by: feed directions, the function ψ whose levels they are, its singular points, and how far
-//! passes lie apart. For pictures and figures; nothing is planned by it.
+//! What passes were planned by: feed directions, the function ψ whose levels they are, its singular points,
+//! and how far passes lie apart. For pictures and figures; nothing is planned by it.
 //!
 //! Enters: the field of each chart or piece, and the contacts of the passes. Leaves: plan-view samples, mm.
 
@@ -156,7 +156,8 @@ pub(crate) fn set_plane(
     planned.directions = evenly(vertices, cell_of(high.x - low.x, high.y - low.y));
 }
 
-/// Takes directions at the vertices of a mesh, at some of them evenly over the part, and their singular points.
+/// Takes directions at the vertices of a mesh, at some of them evenly over the part, and their singular
+/// points.
 pub(crate) fn set_mesh_feed(
     planned: &mut PlannedField,
     part: &Part,
@@ -260,8 +261,8 @@ fn level_lines(part: &Part, chart: &Chart, field: &ScalarField) -> Vec<LevelLine
 /// How far beyond the ends of a side, as a share of it, a neighbour still meets it.
 const END_ROUNDING: f64 = 1e-6;
 
-/// Distance, mm, from point `[pass, index]` to the next pass straight across the feed, to one side; `None` where none is
-/// near.
+/// Distance, mm, from point `[pass, index]` to the next pass straight across the feed, to one side; `None`
+/// where none is near.
 fn neighbour(
     grid: &SegmentGrid,
     passes: &[Vec<Contact>],

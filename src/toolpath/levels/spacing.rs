@@ -183,7 +183,8 @@ fn spread(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
-/// Levels from the lower end, each the least step after the one before that holds at both, half a step from the ends.
+/// Levels from the lower end, each the least step after the one before that holds at both, half a step from
+/// the ends.
 fn one_after_the_other(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
     let width = (hi - lo) / steps.len() as f64;
     let window = |level: f64| (((level - lo) / width).max(0.0) as usize).min(steps.len() - 1);

@@ -1,8 +1,10 @@
-//! Spirals of closed passes that lie one inside the other: the tool moves over to the next pass while it goes around, instead of by a link.
+//! Spirals of closed passes that lie one inside the other: the tool moves over to the next pass while it goes
+//! around, instead of by a link.
 //!
-//! Enters: passes. Leaves: passes, closed ones joined to spirals where that takes less time. The outermost pass and the innermost one are
-//! gone around whole. On a turn between two passes every place lies on the shortest way from the outer to the inner one, at the share
-//! of the turn that is done, so that turns are no farther apart than passes. Heights come from dropping the cutter.
+//! Enters: passes. Leaves: passes, closed ones joined to spirals where that takes less time. The outermost
+//! pass and the innermost one are gone around whole. On a turn between two passes every place lies on the
+//! shortest way from the outer to the inner one, at the share of the turn that is done, so that turns are no
+//! farther apart than passes. Heights come from dropping the cutter.
 
 use crate::vocabulary::{COMPARED_CHORDS, Passes, PlanError, Task};
 use drop_cutter::DropCutter;
@@ -11,7 +13,8 @@ use geometry::{CubicSpline, Point2, Point3, SegmentGrid, inside_curve, signed_ar
 /// Fewest passes of a spiral: of two, both are gone around whole anyway.
 const FEWEST: usize = 3;
 
-/// Passes are neighbours where the ways from one to the other, both ways, are at most this many times as long as they are in the mean.
+/// Passes are neighbours where the ways from one to the other, both ways, are at most this many times as long
+/// as they are in the mean.
 const ALIKE: f64 = 1.5;
 
 /// A turn that takes a longer step than this many times that of its outer pass has jumped.
@@ -221,8 +224,8 @@ mod tests {
         where_quicker(&task, Passes { passes, ..Passes::default() }).unwrap()
     }
 
-    /// All is served that the rings serve: between the outermost and the innermost no place is farther from the spiral than half of
-    /// what the rings are apart.
+    /// All is served that the rings serve: between the outermost and the innermost no place is farther from
+    /// the spiral than half of what the rings are apart.
     #[test]
     fn dear_links_give_way_to_a_spiral_that_serves_as_much() {
         let of_rings = rings(0.0, &RADII);
@@ -251,8 +254,8 @@ mod tests {
         assert!(cheap.passes == of_rings && cheap.notes.is_empty());
     }
 
-    /// Rings around two places have spirals of their own; the one around both goes into neither, and what does not lie beside the
-    /// next all along is none's neighbour.
+    /// Rings around two places have spirals of their own; the one around both goes into neither, and what
+    /// does not lie beside the next all along is none's neighbour.
     #[test]
     fn nests_end_where_rings_part_or_leave_each_other() {
         let small = [4.0, 3.0, 2.0];

@@ -1,12 +1,13 @@
-//! Links on the surface: from the end of a pass to the start of the next along a bend that leaves and
-//! joins them smoothly, the cutter dropped on the part all along it.
+//! Links on the surface: from the end of a pass to the start of the next along a bend that leaves and joins
+//! them smoothly, the cutter dropped on the part all along it.
 //!
-//! In the plan view a bend is a cubic whose ends have the directions of the passes (C. Hermite's form).
-//! With tangents twice as long as the ends lie apart, a turn between two parallel passes is nearly a half
-//! circle, as cubics go; where the ends lie farther apart than passes do, tangents stop growing, and the
-//! way between two turns becomes straight. With shorter tangents the way is shorter and the machine slower in its turns: the bend
-//! that takes the least time is taken, as far as the plan view tells before the cutter is dropped along it. Heights come from
-//! dropping the cutter, so that a link can never cut deeper into the part than its chords, and never raises what stands beside it.
+//! In the plan view a bend is a cubic whose ends have the directions of the passes (C. Hermite's form). With
+//! tangents twice as long as the ends lie apart, a turn between two parallel passes is nearly a half circle,
+//! as cubics go; where the ends lie farther apart than passes do, tangents stop growing, and the way between
+//! two turns becomes straight. With shorter tangents the way is shorter and the machine slower in its turns:
+//! the bend that takes the least time is taken, as far as the plan view tells before the cutter is dropped
+//! along it. Heights come from dropping the cutter, so that a link can never cut deeper into the part than
+//! its chords, and never raises what stands beside it.
 
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::surface::border::Border;
@@ -21,10 +22,12 @@ use work::monitor::{Cancelled, Monitor};
 /// half the distance. Less makes turns tighter, more drives them farther over the border.
 pub const TANGENT: f64 = 2.0;
 
-/// Tangents of the turns that are tried: half circles, and down to ways that are hardly longer than straight ones.
+/// Tangents of the turns that are tried: half circles, and down to ways that are hardly longer than straight
+/// ones.
 const TANGENTS: [f64; 4] = [TANGENT, 1.0, 0.5, 0.25];
 
-/// Tangents are never longer than this many times their share of the distance and the interval between passes.
+/// Tangents are never longer than this many times their share of the distance and the interval between
+/// passes.
 const LONGEST_TANGENT: f64 = 2.0;
 
 /// A link may roll over the border of the part by this many intervals: one for the pass itself, one
@@ -36,8 +39,8 @@ pub const MOST_ROLL: f64 = 2.0;
 /// loop, for a plain bend between them would be a hairpin.
 const NARROW: f64 = 0.5;
 
-/// Turns between ends of which one lies ahead are tried this share of the way beside each other: wide first, and narrower
-/// where that would roll too far over the border.
+/// Turns between ends of which one lies ahead are tried this share of the way beside each other: wide first,
+/// and narrower where that would roll too far over the border.
 const SHARES_BESIDE: [f64; 3] = [1.0, 0.5, 0.25];
 
 /// Tangents at the ends of a loop, in intervals. Half as long, the loop is hardly wider than a hairpin.
@@ -150,8 +153,8 @@ impl Cubic {
     }
 }
 
-/// Places along cubics that follow each other, after the first end up to and with the second, as if the ground rose evenly from one to
-/// the other.
+/// Places along cubics that follow each other, after the first end up to and with the second, as if the
+/// ground rose evenly from one to the other.
 fn lifted(curve: &[Cubic], from: &End, to: &End) -> Vec<Point3> {
     /// Places along each cubic.
     const PLACES: usize = 16;
@@ -185,8 +188,8 @@ impl Turn {
     }
 }
 
-/// The bends worth trying between two ends, the gentlest first, with tangents of some length over the distance of the ends; passes lie an
-/// interval apart, mm.
+/// The bends worth trying between two ends, the gentlest first, with tangents of some length over the
+/// distance of the ends; passes lie an interval apart, mm.
 pub fn curves(interval: f64, tangents: f64, from: &End, to: &End) -> Vec<Vec<Cubic>> {
     let span = (to.tip - from.tip).xy();
     let tangent = tangents * span.norm().min(LONGEST_TANGENT * interval);
@@ -206,9 +209,9 @@ pub fn curves(interval: f64, tangents: f64, from: &End, to: &End) -> Vec<Vec<Cub
     vec![vec![first, second], vec![plain]]
 }
 
-/// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed until the
-/// farther end is reached, and a bend between places this share of the way beside each other that the ends are. One
-/// bend all the way would be a hairpin.
+/// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed
+/// until the farther end is reached, and a bend between places this share of the way beside each other that
+/// the ends are. One bend all the way would be a hairpin.
 fn turn_beside(interval: f64, tangents: f64, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
     let (start, end) = (from.tip.xy(), to.tip.xy());
     let turn = |places: [Point2; 2]| {
@@ -225,8 +228,8 @@ fn turn_beside(interval: f64, tangents: f64, from: &End, to: &End, ahead: f64, s
 }
 
 impl Bends<'_> {
-    /// The moves after the last tip of one pass up to and with the first one of the next; `None` where a link would be too long, or
-    /// leave the part.
+    /// The moves after the last tip of one pass up to and with the first one of the next; `None` where a link
+    /// would be too long, or leave the part.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -280,7 +283,8 @@ impl Bends<'_> {
         Ok(best.map(|(_, moves)| moves))
     }
 
-    /// The tips from an end on along which the machine comes to the feed, with those that tell the curvature there.
+    /// The tips from an end on along which the machine comes to the feed, with those that tell the curvature
+    /// there.
     fn braking<'p>(&self, tips: impl Iterator<Item = &'p Point3>) -> Vec<Point3> {
         let speed = self.feed_rate / 60.0;
         let (mut left, mut last, mut some) = (speed * speed / self.machine.acceleration, None, Vec::new());
@@ -295,7 +299,8 @@ impl Bends<'_> {
         some
     }
 
-    /// What the machine takes for a link, s, more than for the ways of passes to and from it, which are the same for all links.
+    /// What the machine takes for a link, s, more than for the ways of passes to and from it, which are the
+    /// same for all links.
     fn time(
         &self,
         [before, after]: &[Vec<Point3>; 2],

@@ -1,8 +1,9 @@
 //! The shortest way beside fixtures at one height.
 //!
-//! Enters: two places of an upright tool, and what it must keep away from, mm. Leaves: a way of straight moves at that height, if
-//! one is shorter than a limit. A move that meets a fixture is led around the box of that fixture, to its left or to its right,
-//! and what meets the next one likewise. All moves of the way are proven clear.
+//! Enters: two places of an upright tool, and what it must keep away from, mm. Leaves: a way of straight
+//! moves at that height, if one is shorter than a limit. A move that meets a fixture is led around the box of
+//! that fixture, to its left or to its right, and what meets the next one likewise. All moves of the way are
+//! proven clear.
 
 use collision::Interference;
 use geometry::Point3;
@@ -11,7 +12,8 @@ use motion::ClPoint;
 /// Fixtures that a way may lead around. Each doubles the ways to look at.
 const MOST_FIXTURES: usize = 4;
 
-/// Beyond what is needed the way keeps away by this, mm: boxes are exact, and moves count as clear to 1e-5 mm.
+/// Beyond what is needed the way keeps away by this, mm: boxes are exact, and moves count as clear to 1e-5
+/// mm.
 const SPARE: f64 = 1e-3;
 
 /// The places between `from` and `to`, and the length of the way, if it is shorter than `limit`.
@@ -53,7 +55,8 @@ fn around(
     best
 }
 
-/// Corners of the box of an obstacle, so far out that the tool is clear there, on one side of a move and in its order.
+/// Corners of the box of an obstacle, so far out that the tool is clear there, on one side of a move and in
+/// its order.
 fn corners(keep: &Interference<'_>, check: usize, [from, to]: [&ClPoint; 2], side: f64) -> Vec<ClPoint> {
     let bounds = keep.checks[check].obstacle.bounds();
     // All parts of the tool go around it.

@@ -1,12 +1,12 @@
 //! Detours of an upright tool around fixtures.
 //!
-//! Enters: a finished path, what the tool must keep away from, mm. Leaves: the path without what comes too near to a fixture.
-//! Passes end where the tool comes too near and go on where it is clear again. From one to the other, and wherever a move between
-//! passes would meet a fixture, the tool goes over the stock and beside the fixtures, or over all of them where that is
-//! shorter. The rest of the path stays as it is.
+//! Enters: a finished path, what the tool must keep away from, mm. Leaves: the path without what comes too
+//! near to a fixture. Passes end where the tool comes too near and go on where it is clear again. From one to
+//! the other, and wherever a move between passes would meet a fixture, the tool goes over the stock and
+//! beside the fixtures, or over all of them where that is shorter. The rest of the path stays as it is.
 //!
-//! Limits: straight up and down no other way is looked for. Where a fixture hangs over a pass, the check of the finished path
-//! finds it.
+//! Limits: straight up and down no other way is looked for. Where a fixture hangs over a pass, the check of
+//! the finished path finds it.
 
 use super::beside::beside;
 use crate::vocabulary::PlanSettings;

@@ -1,8 +1,9 @@
-//! The way to the first pass from beside the stock, where nothing stands: down at rapid rate, and in at the feed. A plunge from above
-//! is slower where the stock ends nearby.
+//! The way to the first pass from beside the stock, where nothing stands: down at rapid rate, and in at the
+//! feed. A plunge from above is slower where the stock ends nearby.
 //!
-//! Enters: the block of the stock, and where the pass begins, mm. Leaves: tips from outside up to there. The tool comes in at the height of
-//! that place, and over what of the part stands higher; it stays as far from the stock as rapid moves stay above it.
+//! Enters: the block of the stock, and where the pass begins, mm. Leaves: tips from outside up to there. The
+//! tool comes in at the height of that place, and over what of the part stands higher; it stays as far from
+//! the stock as rapid moves stay above it.
 
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::vocabulary::Setup;
@@ -26,7 +27,8 @@ pub struct Sides {
 }
 
 impl Sides {
-    /// Beside the block of the stock; `None` where it may be wider, or something else may stand beside it. On the stock a way in is no longer than a link.
+    /// Beside the block of the stock; `None` where it may be wider, or something else may stand beside it. On
+    /// the stock a way in is no longer than a link.
     pub fn of(setup: &Setup<'_>, longest_link: f64) -> Option<Self> {
         let block = setup.settings.stock.filter(|_| setup.settings.may_enter_beside)?;
         let away = setup.cutter.radius() + setup.settings.clearance;
@@ -69,7 +71,8 @@ impl Sides {
         let (fine, step) = (SAMPLING_SHARE * tolerance, SAMPLING * setup.cutter.radius() / span.norm());
         let mut tips = sample_within_chord(0.0, 1.0, step, fine, &mut locate, &mut watch)?;
         let last = tips.len() - 1;
-        // What stands higher than where the pass begins, up to there, is the part itself; the pass keeps within its tolerance of it.
+        // What stands higher than where the pass begins, up to there, is the part itself; the pass keeps
+        // within its tolerance of it.
         if (tips[last].z - to.z).abs() > tolerance {
             return Ok(None);
         }

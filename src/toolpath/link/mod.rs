@@ -1,21 +1,22 @@
-//! Joins passes into one program: in the order that keeps air moves short, along the surface where the
-//! next pass begins nearby, else by retracts no higher than stock asks for.
+//! Joins passes into one program: in the order that keeps air moves short, along the surface where the next
+//! pass begins nearby, else by retracts no higher than stock asks for.
 //!
-//! Enters: passes as runs of tip positions, mm. Leaves: a program that feeds along every pass from one
-//! end to the other. Between two passes it takes the quicker of
-//! - a link on the surface ([`bend`]): a smooth bend, fed at the cutting feed, that the dropped cutter
-//!   holds on the part;
-//! - a retract: straight up, by the clearance at the feed, over and down at rapid rate, the last of the way down fed. No rapid
-//!   runs lower than the clearance above what stock can stand there ([`ceiling`]), and none rises above the
-//!   safe height over all stock.
+//! Enters: passes as runs of tip positions, mm. Leaves: a program that feeds along every pass from one end to
+//! the other. Between two passes it takes the quicker of
+//! - a link on the surface ([`bend`]): a smooth bend, fed at the cutting feed, that the dropped cutter holds
+//!   on the part;
+//! - a retract: straight up, by the clearance at the feed, over and down at rapid rate, the last of the way
+//!   down fed. No rapid runs lower than the clearance above what stock can stand there ([`ceiling`]), and
+//!   none rises above the safe height over all stock.
 //!
-//! Times are those of length over rate; what the machine loses in corners is left out, which favours
-//! retracts a little.
+//! Times are those of length over rate; what the machine loses in corners is left out, which favours retracts
+//! a little.
 //!
-//! With links on the surface the first pass is entered from beside the stock where that is quicker than a plunge from above ([`entry`]).
+//! With links on the surface the first pass is entered from beside the stock where that is quicker than a
+//! plunge from above ([`entry`]).
 //!
-//! Links on the surface and smoothing are off unless a scene asks for them: bends beside the part change what closed forms
-//! say about its border.
+//! Links on the surface and smoothing are off unless a scene asks for them: bends beside the part change what
+//! closed forms say about its border.
 
 mod bend;
 mod beside;
@@ -44,8 +45,8 @@ pub(crate) use tilted::join_tilted;
 use work::monitor::{self, Cancelled};
 
 /// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
-/// reaches the next pass along borders that passes meet at two degrees or more, and what is shorter is often quicker than a retract;
-/// longer ones leave traces across finished surface.
+/// reaches the next pass along borders that passes meet at two degrees or more, and what is shorter is often
+/// quicker than a retract; longer ones leave traces across finished surface.
 pub const LONGEST_LINK: f64 = 30.0;
 
 /// A closed pass begins this many times as far ahead as it lies beside the tool, so that the link to
@@ -152,8 +153,8 @@ impl Speeds {
         Self { feed, plunge, rapid }
     }
 
-    /// What it takes to go on from one place to another, s, as far as it can be told before there is a program. It is the same both
-    /// ways: a retract counts by the mean height of both.
+    /// What it takes to go on from one place to another, s, as far as it can be told before there is a
+    /// program. It is the same both ways: a retract counts by the mean height of both.
     fn between(&self, settings: &PlanSettings, a: &Point3, b: &Point3, longest: f64) -> f64 {
         let (distance, middle) = ((b - a).norm(), nalgebra::center(a, b));
         let retract =
@@ -181,7 +182,8 @@ impl Speeds {
         down / self.rapid + moves.sum::<f64>()
     }
 
-    /// The rate, mm/s, of a move on the way in: at the feed, and down the tool axis no faster than a plunge, also as the program rounds it.
+    /// The rate, mm/s, of a move on the way in: at the feed, and down the tool axis no faster than a plunge,
+    /// also as the program rounds it.
     fn entering(&self, from: &Point3, to: &Point3, axis: &Vector3) -> f64 {
         let (down, length) = ((from - to).dot(axis) + 2.0 * ROUNDING, (to - from).norm() - 4.0 * ROUNDING);
         if down * self.feed <= self.plunge * length {
@@ -197,7 +199,8 @@ impl Speeds {
     }
 }
 
-/// What it takes to go on from a pass to the next one beside it, s, as far as it can be told before there are passes.
+/// What it takes to go on from a pass to the next one beside it, s, as far as it can be told before there are
+/// passes.
 pub(crate) fn time_to_neighbour(setup: &Setup<'_>) -> f64 {
     let Setup { part, cutter, settings, .. } = *setup;
     let longest = match settings.joining.links {

@@ -1,13 +1,13 @@
 //! The order of passes that keeps moves between them short.
 //!
-//! Enters: passes as runs of tip positions, mm, what it costs to go a distance between two of them, and to begin and end at a place.
-//! Leaves: which pass comes when, from which end, and where closed passes begin. Nothing has to come
-//! before anything else: the passes are those of one finishing path.
+//! Enters: passes as runs of tip positions, mm, what it costs to go a distance between two of them, and to
+//! begin and end at a place. Leaves: which pass comes when, from which end, and where closed passes begin.
+//! Nothing has to come before anything else: the passes are those of one finishing path.
 //!
-//! A path by nearest ends is improved by turning runs of it round (2-opt) and by moving short runs
-//! elsewhere (Or-opt), both between near ends only (G. A. Croes 1958; I. Or 1976; the neighbour lists of
-//! J. L. Bentley, "Fast algorithms for geometric traveling salesman problems", 1992). The steps and
-//! their order depend on nothing but the passes, so the result is the same every time.
+//! A path by nearest ends is improved by turning runs of it round (2-opt) and by moving short runs elsewhere
+//! (Or-opt), both between near ends only (G. A. Croes 1958; I. Or 1976; the neighbour lists of J. L. Bentley,
+//! "Fast algorithms for geometric traveling salesman problems", 1992). The steps and their order depend on
+//! nothing but the passes, so the result is the same every time.
 
 use geometry::{Point2, Point3};
 
@@ -51,8 +51,8 @@ pub struct Costs<'a> {
     pub finish: &'a (dyn Fn(&Point3) -> f64 + Sync),
 }
 
-/// Orders passes of one point or more each. Without `both_ways` every pass keeps its direction.
-/// The first pass given stays where a path by nearest ends begins, though improvement may put others before it.
+/// Orders passes of one point or more each. Without `both_ways` every pass keeps its direction. The first
+/// pass given stays where a path by nearest ends begins, though improvement may put others before it.
 pub fn order(passes: &[Vec<Point3>], both_ways: bool, costs: Costs<'_>) -> Vec<Visit> {
     if passes.is_empty() {
         return Vec::new();

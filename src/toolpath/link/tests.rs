@@ -110,8 +110,8 @@ fn with_half_circles(path: &Toolpath) -> Toolpath {
     Toolpath::new(path.start, moves)
 }
 
-/// On a machine that turns at the feed in no time links are hardly longer than the straight way, and on slower ones they take no more
-/// than half circles.
+/// On a machine that turns at the feed in no time links are hardly longer than the straight way, and on
+/// slower ones they take no more than half circles.
 #[test]
 fn neighbouring_passes_are_joined_by_the_quickest_bend() {
     let passes: Vec<_> =
@@ -360,7 +360,8 @@ proptest! {
     }
 }
 
-/// Of two ways through the same passes that one is taken whose first descent, which is fed slowly, is the shorter.
+/// Of two ways through the same passes that one is taken whose first descent, which is fed slowly, is the
+/// shorter.
 #[test]
 fn passes_begin_at_the_higher_end() {
     let passes: Vec<Vec<Point3>> = (0..4)
@@ -386,8 +387,9 @@ fn a_retract_is_rapid_beyond_the_clearance() {
     assert_eq!(ups, [(MoveKind::Retract, 0.0, 2.0), (MoveKind::Rapid, 2.0, TOP + 2.0)]);
 }
 
-/// The first pass is entered from beside the stock where that is quicker than a plunge: down where nothing stands, in at the feed, over
-/// what of the part stands higher and from there down no faster than a plunge, and no rapid touches the block.
+/// The first pass is entered from beside the stock where that is quicker than a plunge: down where nothing
+/// stands, in at the feed, over what of the part stands higher and from there down no faster than a plunge,
+/// and no rapid touches the block.
 #[test]
 fn the_first_pass_is_entered_from_beside_the_stock() {
     let pass = [line([1.0, 10.0], [19.0, 10.0])];

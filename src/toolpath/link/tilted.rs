@@ -1,9 +1,10 @@
 //! Joins the passes of a tilted cutter into one program.
 //!
 //! Enters: passes as touches of the cutter, mm. Leaves: a program that feeds along every pass from one end to
-//! the other, and goes from one to the next by the quickest way that is clear: on the surface, a little off it, over the block
-//! of part and stock, or around a sphere ([`ways`]). Where the tool is to keep away from something, passes are repaired first,
-//! and what it comes too near to in between, where no way is clear, is noted.
+//! the other, and goes from one to the next by the quickest way that is clear: on the surface, a little off
+//! it, over the block of part and stock, or around a sphere ([`ways`]). Where the tool is to keep away from
+//! something, passes are repaired first, and what it comes too near to in between, where no way is clear, is
+//! noted.
 
 mod ahead;
 mod bent;
@@ -29,7 +30,8 @@ use work::monitor::{self, Monitor};
 /// Times that axes are evened out and passes repaired by turns.
 const EVENINGS: usize = 2;
 
-/// Moves take an axis off that of its pass by no more than this share of what it may turn to the pass beside it.
+/// Moves take an axis off that of its pass by no more than this share of what it may turn to the pass beside
+/// it.
 const STRAYING: f64 = 5e-3;
 
 /// Joins passes; see the module. Leaves, beside the path, [`crate::Plan::too_near_between`].

@@ -1,7 +1,8 @@
 //! Turns a curve of cutter locations into straight moves within a chord tolerance.
 //!
-//! Places are sampled more finely than the chord tolerance and then thinned. Corners move half way to where the chords cut
-//! short, so that the curve runs on both sides of its moves. Where one side is straight, nothing moves.
+//! Places are sampled more finely than the chord tolerance and then thinned. Corners move half way to where
+//! the chords cut short, so that the curve runs on both sides of its moves. Where one side is straight,
+//! nothing moves.
 
 use geometry::{Point3, Vector3, distance_to_segment, share_on};
 use work::monitor::{self, Cancelled, Monitor};
@@ -88,7 +89,8 @@ pub fn sample_within_chord<P: Waypoint>(
     sample_over_jumps(s0, s1, step, tolerance, locate, &mut |_, _, _| Ok(Vec::new()), watch)
 }
 
-/// As [`sample_within_chord`] of a curve that may jump: `across` gives the places between both ends of a jump.
+/// As [`sample_within_chord`] of a curve that may jump: `across` gives the places between both ends of a
+/// jump.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch or `across` says so.
@@ -172,8 +174,8 @@ impl<P: Waypoint> Halving<'_, '_, '_, P> {
 /// pass of n points keeps n/400 at worst where one move would do.
 const MAX_SKIP: usize = 400;
 
-/// Drops points that the rest does without, and moves those that are left aside so that the curve runs on both
-/// sides of the moves: within `tolerance`, and half of it where the curve bends evenly. The ends stay.
+/// Drops points that the rest does without, and moves those that are left aside so that the curve runs on
+/// both sides of the moves: within `tolerance`, and half of it where the curve bends evenly. The ends stay.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
@@ -182,8 +184,8 @@ pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Resul
     Ok(moved_aside(points, &kept, Side::Lesser, tolerance))
 }
 
-/// Indices of the points that the rest does without least: from each the longest straight move that stays within
-/// the `tolerance` of each point that it skips, mm. The ends stay.
+/// Indices of the points that the rest does without least: from each the longest straight move that stays
+/// within the `tolerance` of each point that it skips, mm. The ends stay.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
@@ -216,11 +218,13 @@ pub fn reduced_indices<P: Waypoint>(
 pub enum Side {
     /// The straighter one; where the curve bends both ways not at all. Straight moves stay where they are.
     Lesser,
-    /// The more bent one, by the mean of both where the curve bends both ways. What is beside it must be checked.
+    /// The more bent one, by the mean of both where the curve bends both ways. What is beside it must be
+    /// checked.
     Greater,
 }
 
-/// The points at `knots`, each moved by half the sagitta of one of its sides, at most by the tolerance. The ends stay.
+/// The points at `knots`, each moved by half the sagitta of one of its sides, at most by the tolerance. The
+/// ends stay.
 pub fn moved_aside(curve: &[Point3], knots: &[usize], side: Side, tolerance: f64) -> Vec<Point3> {
     let half_sagitta = |k: usize| {
         let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);

@@ -3,14 +3,15 @@
 //! Enters: points on the exact path, dense enough for the straight lines between them to stand for it.
 //! Leaves: fewer points whose straight moves stay within a tolerance of those lines.
 //!
-//! Smoothing takes the values of the natural cubic spline (C2) that minimises `Σ |f(tᵢ) − pᵢ|²/uᵢ + λ ∫ |f″|²`
-//! (C. H. Reinsch, "Smoothing by spline functions", 1967) at its knots `tᵢ`, the length along the pass. The
-//! weights `uᵢ` shrink where the spline strays too far, until it stays within a share of the tolerance
-//! everywhere: kinks at a mesh's edges turn over their surroundings, and sharp ones keep their place.
+//! Smoothing takes the values of the natural cubic spline (C2) that minimises
+//! `Σ |f(tᵢ) − pᵢ|²/uᵢ + λ ∫ |f″|²` (C. H. Reinsch, "Smoothing by spline functions", 1967) at its knots `tᵢ`,
+//! the length along the pass. The weights `uᵢ` shrink where the spline strays too far, until it stays within
+//! a share of the tolerance everywhere: kinks at a mesh's edges turn over their surroundings, and sharp ones
+//! keep their place.
 //!
 //! Spreading puts the points beside the curve: a chord between points on it lies on one side of it by its
-//! whole sagitta, between points as far on the other side by half of it, so that chords can be √2 times
-//! as long. Every input point is held against the move that passes it, whatever smoothing did.
+//! whole sagitta, between points as far on the other side by half of it, so that chords can be √2 times as
+//! long. Every input point is held against the move that passes it, whatever smoothing did.
 //!
 //! Of a tilted cutter the centres of its arc are smoothed and spread; each keeps the axis that it has.
 
@@ -34,8 +35,8 @@ const ROUNDS: usize = 12;
 /// nothing for curvature that changes from chord to chord, and chords that then fail are halved.
 const SAGITTA: f64 = 1.8;
 
-/// The same of tilted cutters, of which the one with the fewest points is taken: what turning adds to a sagitta, on a move and
-/// between axes, lies on one side of it.
+/// The same of tilted cutters, of which the one with the fewest points is taken: what turning adds to a
+/// sagitta, on a move and between axes, lies on one side of it.
 const SAGITTAS_TILTED: [f64; 3] = [SAGITTA, 1.5, 1.2];
 
 /// Rounds in which chords that do not hold are divided; what remains then is thinned without spreading.
@@ -62,7 +63,8 @@ pub fn smooth_and_spread(
     }
 }
 
-/// As [`smooth_and_spread`], for a tilted cutter; `None` where that fails, or where moves would not `hold`: of the touches that they pass, from one touch to another.
+/// As [`smooth_and_spread`], for a tilted cutter; `None` where that fails, or where moves would not `hold`:
+/// of the touches that they pass, from one touch to another.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
@@ -188,9 +190,9 @@ fn moves_of_spline(points: &[Point3], steps: &[f64], slack: &[f64], lambda: f64)
     moved
 }
 
-/// Fewer points along `curve`, `sagitta` tolerances apart and each moved aside by half the sagittas beside it, whose moves `hold` and stay within
-/// `tolerance` of all `points`; `None` where they do not. `place` puts the point of an index on a place of the curve. Both
-/// lists have the same length.
+/// Fewer points along `curve`, `sagitta` tolerances apart and each moved aside by half the sagittas beside
+/// it, whose moves `hold` and stay within `tolerance` of all `points`; `None` where they do not. `place` puts
+/// the point of an index on a place of the curve. Both lists have the same length.
 fn spread<P: Waypoint>(
     points: &[P],
     curve: &[Point3],

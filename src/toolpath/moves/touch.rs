@@ -5,8 +5,8 @@ use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{AxisError, CcPoint, ClPoint, ToolAxis, location};
 
-/// The axis turns by no more than this in one move, rad: controls interpolate rotary axes, not the axis itself, and the
-/// holder swings in between.
+/// The axis turns by no more than this in one move, rad: controls interpolate rotary axes, not the axis
+/// itself, and the holder swings in between.
 pub(crate) const GREATEST_TURN: f64 = 0.1;
 
 /// A cutter touching the part.

@@ -1,21 +1,25 @@
 //! Where no stock stands before the first cut: beyond open sides, and where a larger cutter was.
 //!
-//! Enters: the pocket, the cutter's radius, runs. Leaves: discs of that ground for the plan, ways along its border where passes
-//! begin, and the runs without what they would do in the air. There the cutter comes down straight; mm.
+//! Enters: the pocket, the cutter's radius, runs. Leaves: discs of that ground for the plan, ways along its
+//! border where passes begin, and the runs without what they would do in the air. There the cutter comes down
+//! straight; mm.
 
 use super::route::{Entry, Run};
 use super::shape::Pocket;
 use super::walls::Room;
 use geometry::{CurveSegment, Point2, Region, RegionIndex, SegmentGrid, Vector2};
 
-/// A disc over the cutter's radius that lies in the air where the cutter may come down, so that it touches no stock.
+/// A disc over the cutter's radius that lies in the air where the cutter may come down, so that it touches no
+/// stock.
 const HELD: f64 = 1.02;
 
-/// Places along borders, and of ground far from them, over the radius: discs there leave no more than films between them.
+/// Places along borders, and of ground far from them, over the radius: discs there leave no more than films
+/// between them.
 const ALONG: f64 = 0.12;
 const APART: f64 = 0.7;
 
-/// Runs are asked at places this far apart over the radius; and ways in the air are left out that are longer than so many.
+/// Runs are asked at places this far apart over the radius; and ways in the air are left out that are longer
+/// than so many.
 const BIT: f64 = 0.1;
 const LONG: f64 = 6.0;
 
@@ -76,7 +80,8 @@ impl Air {
         found
     }
 
-    /// The run entered from the nearest border instead of down through stock, if a straight way leads from there.
+    /// The run entered from the nearest border instead of down through stock, if a straight way leads from
+    /// there.
     pub fn entered(&self, mut run: Run, room: &Room) -> Run {
         let begin = run.points.first().filter(|p| !self.holds(p));
         let near = begin.and_then(|begin| Some((begin, self.borders.nearest(begin)?)));

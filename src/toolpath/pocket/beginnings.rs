@@ -1,15 +1,16 @@
-//! Places of passes where others may begin, by place: the one nearest to the end of a way, and which of them are known to have
-//! stock beside them.
+//! Places of passes where others may begin, by place: the one nearest to the end of a way, and which of them
+//! are known to have stock beside them.
 //!
-//! Ground is only ever cleared. So a place without stock is forgotten, and one with stock is asked again only after something
-//! was cleared so near that it matters. So is a place from which no pass came through, when no other one is left; mm.
+//! Ground is only ever cleared. So a place without stock is forgotten, and one with stock is asked again only
+//! after something was cleared so near that it matters. So is a place from which no pass came through, when
+//! no other one is left; mm.
 
 use std::collections::HashMap;
 
 use geometry::{Point2, Vector2};
 
-/// Cells that what was cleared in one may matter to, to either side: the circumference of a cutter beside a place and the disc
-/// about what was cleared meet within 2.11 radii, and a cell is a radius.
+/// Cells that what was cleared in one may matter to, to either side: the circumference of a cutter beside a
+/// place and the disc about what was cleared meet within 2.11 radii, and a cell is a radius.
 const AROUND: i32 = 3;
 
 type Cell = [i32; 2];
@@ -93,8 +94,8 @@ impl Beginnings {
         self.changed.get(&self.cell(&self.all[k].at)).copied().unwrap_or(0)
     }
 
-    /// No pass came through from a place: it waits for ground to be cleared near to it. Those that are the same are forgotten:
-    /// every pass that began there has it, too.
+    /// No pass came through from a place: it waits for ground to be cleared near to it. Those that are the
+    /// same are forgotten: every pass that began there has it, too.
     pub fn fail(&mut self, k: usize) {
         self.failed.push((k, self.passes));
         let (at, heading) = (self.all[k].at, self.all[k].heading);
@@ -103,7 +104,8 @@ impl Beginnings {
         cell.into_iter().filter(alike).collect::<Vec<usize>>().into_iter().for_each(|k| self.forget(k));
     }
 
-    /// Takes back places from which no pass came through where ground was cleared since; whether there are any.
+    /// Takes back places from which no pass came through where ground was cleared since; whether there are
+    /// any.
     pub fn take_back(&mut self) -> bool {
         let failed = std::mem::take(&mut self.failed);
         let (again, waiting) = failed.into_iter().partition(|(k, at)| self.changed_at(*k) > *at);
@@ -218,7 +220,8 @@ mod tests {
         assert_eq!(places.left, 2);
     }
 
-    /// A place from which no pass came through is taken back after ground was cleared near to it, and not before.
+    /// A place from which no pass came through is taken back after ground was cleared near to it, and not
+    /// before.
     #[test]
     fn failed_places_are_taken_back_where_ground_was_cleared() {
         let mut places = Beginnings::new(1.0);

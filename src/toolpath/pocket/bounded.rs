@@ -8,9 +8,10 @@
 //! is opened by a helix where there is room. Every place is asked for the angle of the circumference in stock
 //! before the cutter goes there ([`Cleared`]); mm, rad.
 //!
-//! Loops may be anywhere in the piece and not only within their nest: thin nests leave them no room. A loop cannot grow out
-//! of a single disc, whose far side moves at right angles to its heading; hence the helix. Past the end of a line of a
-//! zigzag the link along the wall goes to the side of its loops and finds ground to begin in.
+//! Loops may be anywhere in the piece and not only within their nest: thin nests leave them no room. A loop
+//! cannot grow out of a single disc, whose far side moves at right angles to its heading; hence the helix.
+//! Past the end of a line of a zigzag the link along the wall goes to the side of its loops and finds ground
+//! to begin in.
 
 use std::cell::Cell;
 
@@ -135,7 +136,8 @@ struct Walker<'a> {
     above_to: f64,
     /// The ground is thinned when it has so many places.
     thin_at: usize,
-    /// Where the last loop that could not be put in was above the limit, in sides from its beginning: others are asked there first.
+    /// Where the last loop that could not be put in was above the limit, in sides from its beginning: others
+    /// are asked there first.
     above_at: Cell<usize>,
     did: Bounding,
 }
@@ -213,7 +215,8 @@ impl<'a> Walker<'a> {
         self.marks.push(Mark { s, out: self.out.len(), places: self.cleared.len() });
     }
 
-    /// Leaves out places of the ground that others cover, where none of them will be taken back and none is fresh at `s`.
+    /// Leaves out places of the ground that others cover, where none of them will be taken back and none is
+    /// fresh at `s`.
     fn thin(&mut self, s: f64) {
         /// Fewer are no matter.
         const FEW: usize = 200;
@@ -297,17 +300,20 @@ impl<'a> Walker<'a> {
         self.marks.get(behind).map_or(0, |m| m.places - 1)
     }
 
-    /// Goes on from `s` to a corner of walls right before it, a film at a time, each after a way back and forth over cleared ground:
-    /// where no loop fits any more, only a layer that loads nothing may stand at so great an angle. Leaves how far it came.
+    /// Goes on from `s` to a corner of walls right before it, a film at a time, each after a way back and
+    /// forth over cleared ground: where no loop fits any more, only a layer that loads nothing may stand at
+    /// so great an angle. Leaves how far it came.
     fn nibble(&mut self, s: f64) -> f64 {
         /// Layers over a film. Greater might be more than one, where chords meet.
         const LAYER: f64 = 0.9;
-        /// Longer ways, over the radius, are slots that the report has to name. Tips of 40 degrees, and those before necks that are
-        /// too narrow, end within it at the smallest limits.
+        /// Longer ways, over the radius, are slots that the report has to name. Tips of 40 degrees, and those
+        /// before necks that are too narrow, end within it at the smallest limits.
         const MOST: f64 = 0.5;
-        /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any more.
+        /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any
+        /// more.
         const BACK: f64 = 0.06;
-        /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.
+        /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond
+        /// them.
         const WALLS: f64 = 0.8;
         let (radius, corner) = (self.radius, self.way.corner_after(s));
         // Where the way begins nearer than that, it is gone back and forth more often.

@@ -1,9 +1,10 @@
 //! The chambers of a piece: its wide places, each with the ground around it up to the necks between them.
 //!
-//! Enters: the piece of the cutter's centre. Leaves: the chamber of each place. Two wide places are chambers of their own where every
-//! way between them passes a neck with half of the room that the narrower of them has. Places are square cells in the order of
-//! their distance from the walls, the greatest first: each belongs to the chamber of one beside it, and two chambers meet at the
-//! neck between them (watersheds: S. Beucher, C. Lantuéjoul, 1979); mm.
+//! Enters: the piece of the cutter's centre. Leaves: the chamber of each place. Two wide places are chambers
+//! of their own where every way between them passes a neck with half of the room that the narrower of them
+//! has. Places are square cells in the order of their distance from the walls, the greatest first: each
+//! belongs to the chamber of one beside it, and two chambers meet at the neck between them (watersheds: S.
+//! Beucher, C. Lantuéjoul, 1979); mm.
 
 use super::walls::Room;
 use geometry::{Piece, Point2, Region, Vector2};
@@ -138,7 +139,8 @@ mod tests {
     use super::*;
     use work::monitor::Silent;
 
-    /// Two squares of the half side 10 joined by a corridor: chambers of their own where it is narrower than half, and divided in it.
+    /// Two squares of the half side 10 joined by a corridor: chambers of their own where it is narrower than
+    /// half, and divided in it.
     #[test]
     fn places_are_apart_beyond_a_neck() {
         let chambers = |half: f64| {

@@ -4,8 +4,8 @@
 //! angle of the front half of the circumference that meets stock. The ground cleared is the union of the
 //! discs about those places, in closed form; mm, rad.
 //!
-//! The heading is that of the straight side that the cutter runs. In a small loop it differs from the circle's by half the
-//! angle between two sides. So thinning keeps the headings.
+//! The heading is that of the straight side that the cutter runs. In a small loop it differs from the
+//! circle's by half the angle between two sides. So thinning keeps the headings.
 
 use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
@@ -19,8 +19,8 @@ use geometry::{Point2, Vector2};
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
 pub(super) const FILM: f64 = 0.003;
 
-/// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
-/// of a move are looked at where that is not sure.
+/// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare;
+/// and so many parts of a move are looked at where that is not sure.
 pub(super) const BETWEEN: f64 = 0.012;
 const BETWEEN_PLACES: usize = 8;
 
@@ -154,12 +154,12 @@ impl Cleared {
         self.discs.truncate(count);
     }
 
-    /// Leaves out discs among the first `count` that others of them cover whole: every angle stays the same. They still count as
-    /// places, and none of the first `count` may be taken back from here on.
+    /// Leaves out discs among the first `count` that others of them cover whole: every angle stays the same.
+    /// They still count as places, and none of the first `count` may be taken back from here on.
     ///
-    /// A disc is covered where those that hold its middle cover its circumference: each is convex, so with a place of the
-    /// circumference it covers the straight line from the middle to there. With all radii a film greater it still is: that
-    /// its circumference is covered means that it lies beyond its Voronoi cell.
+    /// A disc is covered where those that hold its middle cover its circumference: each is convex, so with a
+    /// place of the circumference it covers the straight line from the middle to there. With all radii a film
+    /// greater it still is: that its circumference is covered means that it lies beyond its Voronoi cell.
     pub fn thin(&mut self, count: usize) {
         let count = count.min(self.discs.len());
         let changed = self.changed();
@@ -199,8 +199,8 @@ impl Cleared {
         }
     }
 
-    /// Whether anything is `found` among the `others` that hold the middle of a disc, which are told where they lie from there, over
-    /// the radius.
+    /// Whether anything is `found` among the `others` that hold the middle of a disc, which are told where
+    /// they lie from there, over the radius.
     fn any_beside(
         &self,
         disc: usize,
@@ -229,8 +229,8 @@ impl Cleared {
         changed
     }
 
-    /// The discs from `first` on whose centres may be within a box, by bucket, the last first, as long as `tell` wants more; whether
-    /// it still did in the end.
+    /// The discs from `first` on whose centres may be within a box, by bucket, the last first, as long as
+    /// `tell` wants more; whether it still did in the end.
     fn each_within(&self, [lo, hi]: &[Point2; 2], first: usize, mut tell: impl FnMut(&Disc) -> bool) -> bool {
         let (lo, hi) = (lo - self.origin, hi - self.origin);
         let mut rows = self.column(1, lo.y)..=self.column(1, hi.y);
@@ -261,17 +261,17 @@ impl Cleared {
         near.map(|gentle| gentle.by).sum()
     }
 
-    /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
-    /// cutter has turned along the stock on its right.
+    /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that
+    /// there is once the cutter has turned along the stock on its right.
     pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
         let angle =
             self.front(centre, heading, 0.0, fresh, 0.0).ends().map_or(0.0, |[_, to]| PART * to as f64);
         self.counted(centre, angle)
     }
 
-    /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
-    /// disc is convex: what it clears from both ends, it clears from everywhere between. Where that is not enough, places close
-    /// to each other are asked.
+    /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed
+    /// between its ends. A disc is convex: what it clears from both ends, it clears from everywhere between.
+    /// Where that is not enough, places close to each other are asked.
     pub fn keeps(&self, from: &Point2, to: &Point2, limit: f64, fresh: usize) -> bool {
         let (along, length) = (to - from, (to - from).norm());
         if length == 0.0 {
@@ -285,8 +285,8 @@ impl Cleared {
             || (0..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
     }
 
-    /// The front of a straight move of the length `2 half` about `centre`. Where no more than `enough` stands, rad, no more is
-    /// looked for that clears it.
+    /// The front of a straight move of the length `2 half` about `centre`. Where no more than `enough`
+    /// stands, rad, no more is looked for that clears it.
     fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize, enough: f64) -> Arc {
         let enough = (enough.max(0.0) / PART) as u32;
         let mut front = Front::new(self.radius, heading, half);
@@ -320,8 +320,9 @@ impl Cleared {
         front.standing
     }
 
-    /// Lists the discs that decide about all places near to one, the last first: those that may clear a sector of the circumference
-    /// which no disc clears whole wherever the place is, and for each other sector one that does.
+    /// Lists the discs that decide about all places near to one, the last first: those that may clear a
+    /// sector of the circumference which no disc clears whole wherever the place is, and for each other
+    /// sector one that does.
     fn list(&self, near: &mut Near, anchor: &Point2) {
         let reach = NEIGHBOURS * self.radius;
         let off = reach + self.radius * PI / SECTORS as f64;
@@ -429,7 +430,8 @@ mod tests {
         assert!(before.iter().any(|arc| *arc > 0.0 && *arc < PI));
     }
 
-    /// A straight pass keeps to its angle all along. A post of stock is passed between two places that do not see it.
+    /// A straight pass keeps to its angle all along. A post of stock is passed between two places that do not
+    /// see it.
     #[test]
     fn what_stands_between_two_places_is_seen() {
         let (x, exact) = (Vector2::new(1.0, 0.0), 0.5f64.acos());

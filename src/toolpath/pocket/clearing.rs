@@ -1,8 +1,8 @@
 //! A piece cleared by passes of constant engagement, and what they leave.
 //!
-//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins with a helix, or in
-//! the air where there is some, and runs that keep to the limit by loops: to places where stock may still stand, and along the
-//! walls; mm.
+//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins
+//! with a helix, or in the air where there is some, and runs that keep to the limit by loops: to places where
+//! stock may still stand, and along the walls; mm.
 
 use super::air::Air;
 use super::bounded::{Bounding, Rules, STEP, bound_all};
@@ -40,7 +40,8 @@ impl Clearing {
 
 /// Clears a piece; `None` where it has neither air nor room for a helix.
 ///
-/// Passes go through necks, or each chamber gets a helix of its own before they do, whichever makes the shorter path.
+/// Passes go through necks, or each chamber gets a helix of its own before they do, whichever makes the
+/// shorter path.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -144,8 +145,9 @@ impl Clearer<'_> {
         Ok(Some(clearing))
     }
 
-    /// The passes that go on from the end of a way over ground that is cleared. Before another helix has to go down, places from which
-    /// none came through are tried again, which stays where it comes to the place of that helix.
+    /// The passes that go on from the end of a way over ground that is cleared. Before another helix has to
+    /// go down, places from which none came through are tried again, which stays where it comes to the place
+    /// of that helix.
     fn peeled(&mut self, way: &[Point2], entry: Entry) -> Result<Run, Cancelled> {
         let bounds = self.rules.bounds;
         let chambers = self.chambers.as_deref();
@@ -206,7 +208,8 @@ mod tests {
         Rules { bounds, sides: Sides::Left, helix: [0.8 * radius, 0.2 * radius], down: 40.0 }
     }
 
-    /// Two circles joined by a corridor: from a helix each they are cleared by a much shorter path than through the corridor.
+    /// Two circles joined by a corridor: from a helix each they are cleared by a much shorter path than
+    /// through the corridor.
     #[test]
     fn chambers_get_helices_of_their_own_where_that_is_shorter() {
         let (radius, half) = (9.0f64, 3.5f64);

@@ -7,8 +7,8 @@ use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
 use motion::{ClPoint, Move, MoveKind, Toolpath, in_last_decimals};
 
-/// Share of the chord tolerance that the chords of a helix may use, when the rest is left to what is done with the moves
-/// afterwards. Greater shares make fewer moves.
+/// Share of the chord tolerance that the chords of a helix may use, when the rest is left to what is done
+/// with the moves afterwards. Greater shares make fewer moves.
 const ARC_SHARE: f64 = 0.5;
 
 /// A way down begins this far above the stock that is left, mm: rapids end there.
@@ -230,7 +230,8 @@ mod tests {
     use super::*;
     use crate::{Pattern, Step};
 
-    /// A short line between islands, from which the run goes on: the way down keeps to the slope of ramps along all of the run.
+    /// A short line between islands, from which the run goes on: the way down keeps to the slope of ramps
+    /// along all of the run.
     #[test]
     fn ramps_on_short_lines_go_on_along_the_run() {
         let points: Vec<Point2> =
@@ -261,8 +262,9 @@ mod tests {
         assert_eq!(way_down(&run, 0.0, -2.0, &strategy, 1e-3).len(), 2);
     }
 
-    /// Ways down with sides from micrometres to millimetres, steep and flat, around a helix as well: as the program is written, its
-    /// coordinates rounded, no move goes down faster than the plunge rate, and flat ones are fed as fast as passes.
+    /// Ways down with sides from micrometres to millimetres, steep and flat, around a helix as well: as the
+    /// program is written, its coordinates rounded, no move goes down faster than the plunge rate, and flat
+    /// ones are fed as fast as passes.
     #[test]
     fn written_ways_down_keep_the_plunge_rate() {
         let strategy = |ramp_angle: f64| PocketStrategy {

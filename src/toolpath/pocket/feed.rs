@@ -103,7 +103,8 @@ mod tests {
     use super::*;
     use motion::{ClPoint, Move};
 
-    /// Moves of one unit along x: two stretches above the limit, which a way down parts, and one at the limit.
+    /// Moves of one unit along x: two stretches above the limit, which a way down parts, and one at the
+    /// limit.
     #[test]
     fn stretches_above_the_limit_have_place_length_and_angle() {
         use MoveKind::{Cut, Plunge};

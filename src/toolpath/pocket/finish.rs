@@ -1,9 +1,10 @@
 //! The last pass along walls: entered and left by arcs that touch them.
 //!
-//! Enters: a wall of the piece of the cutter's centre, with the piece on its left, the rooms of the last pass and of the passes
-//! before it, what these left. Leaves: a run that comes down beside the wall over ground that is cleared, swings onto it by a
-//! quarter of a circle, goes around it and swings off it. So the cutter neither stops nor turns sharply where it touches the
-//! wall. Without room for an arc the run begins on the wall itself, which it ramps along; mm.
+//! Enters: a wall of the piece of the cutter's centre, with the piece on its left, the rooms of the last pass
+//! and of the passes before it, what these left. Leaves: a run that comes down beside the wall over ground
+//! that is cleared, swings onto it by a quarter of a circle, goes around it and swings off it. So the cutter
+//! neither stops nor turns sharply where it touches the wall. Without room for an arc the run begins on the
+//! wall itself, which it ramps along; mm.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -18,7 +19,8 @@ const RADII: [f64; 4] = [0.6, 0.4, 0.25, 0.12];
 const PLACES: usize = 48;
 const SIDES: usize = 24;
 
-/// The pass ends at most this far beyond its beginning, over the radius, so that no mark stays between its arcs.
+/// The pass ends at most this far beyond its beginning, over the radius, so that no mark stays between its
+/// arcs.
 const OVERLAP: f64 = 0.05;
 
 /// The runs along all walls of the centre's region, by piece, beside what `rough` passes have cleared.
@@ -38,7 +40,8 @@ pub(super) fn along_walls<'p>(region: &'p Region, rough: &Region, radius: f64) -
     region.pieces.iter().map(of_piece).collect()
 }
 
-/// The run of the last pass along `wall`. `rough` is the piece that the passes before have cleared with the cutter's centre.
+/// The run of the last pass along `wall`. `rough` is the piece that the passes before have cleared with the
+/// cutter's centre.
 fn around(wall: &[Point2], room: &Room, rough: Option<&Piece>, radius: f64) -> Run {
     rough.and_then(|rough| swung(wall, room, rough, radius)).unwrap_or_else(|| {
         let mut around = wall.to_vec();
@@ -89,7 +92,8 @@ fn places(wall: &[Point2]) -> Vec<Point2> {
     sides.iter().take(PLACES).map(|[a, b]| nalgebra::center(a, b)).collect()
 }
 
-/// An arc that turns left about the place on the left of `at`, from one quarter of a turn to another one; at 0 it touches `at`.
+/// An arc that turns left about the place on the left of `at`, from one quarter of a turn to another one; at
+/// 0 it touches `at`.
 fn quarter(at: &Point2, along: &Vector2, rho: f64, [from, to]: [f64; 2]) -> Vec<Point2> {
     let left = Vector2::new(-along.y, along.x);
     let place = |k: usize| {
@@ -107,7 +111,8 @@ mod tests {
         [(a, a), (b, a), (b, b), (a, b)].map(|(x, y)| Point2::new(x, y)).to_vec()
     }
 
-    /// Comes onto the wall and leaves it in its direction, from ground that is cleared, and goes over all of it.
+    /// Comes onto the wall and leaves it in its direction, from ground that is cleared, and goes over all of
+    /// it.
     #[test]
     fn the_last_pass_swings_onto_the_wall_and_off_it() {
         let island = |a, b| square(a, b).into_iter().rev().collect::<Vec<_>>();

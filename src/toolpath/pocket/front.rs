@@ -1,7 +1,8 @@
-//! The front of a cutter's circumference that stands in stock while discs clear it, and the rim of a disc that others cover.
+//! The front of a cutter's circumference that stands in stock while discs clear it, and the rim of a disc
+//! that others cover.
 //!
-//! Enters: where discs lie from the middle of a move or of a disc. Leaves: the parts of the front, or of the rim, that none of them
-//! covers; mm, rad.
+//! Enters: where discs lie from the middle of a move or of a disc. Leaves: the parts of the front, or of the
+//! rim, that none of them covers; mm, rad.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
@@ -9,7 +10,8 @@ use std::sync::LazyLock;
 use super::cleared::FILM;
 use geometry::Vector2;
 
-/// Arcs that cover a circumference overlap by more than so much, rad: what is less may be the error of two angles.
+/// Arcs that cover a circumference overlap by more than so much, rad: what is less may be the error of two
+/// angles.
 const ROUNDING: f64 = 1e-7;
 
 /// Parts of the front half circle that are told apart.
@@ -49,7 +51,8 @@ impl Front {
                 Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
             })
         });
-        // The arc between them is half a circle at most: no place of it is farther from the middle of its chord than its ends.
+        // The arc between them is half a circle at most: no place of it is farther from the middle of its
+        // chord than its ends.
         if let Some([a, b]) = &self.ends {
             self.middle = (a + b) * 0.5;
             let reach = self.radius * (1.0 + FILM + ROUNDING) + self.half + (b - a).norm() * 0.5;
@@ -57,8 +60,8 @@ impl Front {
         }
     }
 
-    /// Whether a disc meets the circumference between the ends: it does along an arc about its direction, which holds an end
-    /// or lies between them.
+    /// Whether a disc meets the circumference between the ends: it does along an arc about its direction,
+    /// which holds an end or lies between them.
     fn meets(&self, to: &Vector2, grown: f64) -> bool {
         let Some([a, b]) = &self.ends else { return false };
         let square = grown * grown;
@@ -99,8 +102,8 @@ impl Front {
     }
 }
 
-/// The angle of a vector from the x axis, rad, within 3e-8: of a part of the front that is next to nothing, and in half of the time
-/// (M. Abramowitz, I. Stegun, 1964, 4.4.49).
+/// The angle of a vector from the x axis, rad, within 3e-8: of a part of the front that is next to nothing,
+/// and in half of the time (M. Abramowitz, I. Stegun, 1964, 4.4.49).
 fn angle_of(x: f64, y: f64) -> f64 {
     const SERIES: [f64; 9] = [
         0.0028662257,
@@ -169,7 +172,8 @@ impl Rim {
         }
         let half = half_angle(0.5 * square.sqrt()) - ROUNDING;
         let towards = angle_of(to.x, to.y);
-        // A turn is added, so that casts round down. A sixth of the circumference is covered to each side at least.
+        // A turn is added, so that casts round down. A sixth of the circumference is covered to each side at
+        // least.
         let from = 2 * PARTS as u32 - (PARTS - (towards - half) / TAU * PARTS) as u32;
         let until = (PARTS + (towards + half) / TAU * PARTS) as u32;
         let bits = u64::MAX >> (PARTS as u32 - (until - from));
@@ -191,7 +195,8 @@ pub(super) struct Arc([u64; PARTS / 64]);
 impl Arc {
     const FRONT: Self = Self([u64::MAX; PARTS / 64]);
 
-    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; how many stood.
+    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; how
+    /// many stood.
     pub fn clear(&mut self, from: f64, to: f64) -> u32 {
         let mut stood = 0;
         for turn in [-TAU, 0.0, TAU] {

@@ -60,7 +60,8 @@ pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
     along_walls(lines, Vec::new(), piece, spacing, |row, next| next == row + 1)
 }
 
-/// Runs that go on with lines, each from the end of one that it follows by its row, and then go around each wall.
+/// Runs that go on with lines, each from the end of one that it follows by its row, and then go around each
+/// wall.
 pub(super) fn along_walls(
     lines: Vec<Line>,
     runs: Vec<Run>,
@@ -123,7 +124,8 @@ fn chained(
     runs
 }
 
-/// A way from an end of a line to that of another: along the wall that both are at, else straight where nothing is between.
+/// A way from an end of a line to that of another: along the wall that both are at, else straight where
+/// nothing is between.
 fn link(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], spacing: f64) -> Option<Vec<Point2>> {
     /// It is at most so many times the distance of rows long.
     const LONGEST: f64 = 4.0;
@@ -136,7 +138,8 @@ fn link(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], spacing: f64) 
     is_clear(piece, walls, &[*a, *b], longest).then(|| vec![*a, *b])
 }
 
-/// Whether a straight way is no longer than `longest` and stays in the piece, as far as some places of it tell.
+/// Whether a straight way is no longer than `longest` and stays in the piece, as far as some places of it
+/// tell.
 pub(super) fn is_clear(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], longest: f64) -> bool {
     const PLACES: usize = 16;
     let inside = |p: &Point2| piece.contains(p) || walls.distance(p) < 1e-6;

@@ -1,9 +1,10 @@
 //! Ways over cleared ground, at depth, from the end of one pass to the beginning of the next one.
 //!
-//! Enters: the room of the cutter's centre, the ground, where and in which direction a pass ends and the next one begins, and
-//! places that the centre has been at. Leaves: the places between. A link is an arc, a straight line and an arc, the shortest
-//! of the four such ways that is free (L. E. Dubins, 1957); else a way with corners from place to place whose sides are free
-//! (A*: P. Hart, N. Nilsson, B. Raphael, 1968), pulled taut; mm, rad.
+//! Enters: the room of the cutter's centre, the ground, where and in which direction a pass ends and the next
+//! one begins, and places that the centre has been at. Leaves: the places between. A link is an arc, a
+//! straight line and an arc, the shortest of the four such ways that is free (L. E. Dubins, 1957); else a way
+//! with corners from place to place whose sides are free (A*: P. Hart, N. Nilsson, B. Raphael, 1968), pulled
+//! taut; mm, rad.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -13,8 +14,8 @@ use super::cleared::Cleared;
 use super::walls::Room;
 use geometry::{Point2, Vector2};
 
-/// Radii of the arcs over the cutter's, the first that has a free way is taken. Greater ones make longer links, which are half of
-/// a path in narrow places.
+/// Radii of the arcs over the cutter's, the first that has a free way is taken. Greater ones make longer
+/// links, which are half of a path in narrow places.
 const RADII: [f64; 2] = [0.15, 0.1];
 
 /// Sides of arcs turn by at most so much, rad: their chords stay far within a film of the arc.
@@ -67,7 +68,8 @@ pub(super) struct Links<'a> {
 }
 
 impl Links<'_> {
-    /// The places between the end of the way `gone` and one of its places, which is to be left in the direction `heading`.
+    /// The places between the end of the way `gone` and one of its places, which is to be left in the
+    /// direction `heading`.
     pub fn between(&self, gone: &[Point2], index: usize, heading: Vector2) -> Vec<Point2> {
         let n = gone.len();
         let (end, to) = (gone[n - 1], gone[index]);
@@ -87,7 +89,8 @@ impl Links<'_> {
         smooth.or_else(|| self.around(end, to)).unwrap_or_else(|| back(gone, index))
     }
 
-    /// A short way with corners at places that were visited. Sides are asked for only where such a way wants them.
+    /// A short way with corners at places that were visited. Sides are asked for only where such a way wants
+    /// them.
     fn around(&self, end: Point2, to: Point2) -> Option<Vec<Point2>> {
         const TARGET: usize = 1;
         let mut nodes = vec![end, to];
@@ -162,7 +165,8 @@ impl Links<'_> {
     }
 }
 
-/// The way back to one of the places of a way, ends left out. What it was at before it does not go around to again.
+/// The way back to one of the places of a way, ends left out. What it was at before it does not go around to
+/// again.
 fn back(gone: &[Point2], index: usize) -> Vec<Point2> {
     let mut way: Vec<Point2> = Vec::new();
     let mut known = HashMap::new();
@@ -194,7 +198,8 @@ fn dubins((p, u): Pose, (q, v): Pose, rho: f64) -> Vec<(f64, Vec<Point2>)> {
         if square < off || square == 0.0 {
             continue;
         }
-        // Along the straight line lies what is left of the way between the centres, across it what their sides differ by.
+        // Along the straight line lies what is left of the way between the centres, across it what their
+        // sides differ by.
         let straight = (square - off).sqrt();
         let along = angle(&between) - across.atan2(straight);
         let turns =
@@ -222,8 +227,8 @@ fn dubins((p, u): Pose, (q, v): Pose, rho: f64) -> Vec<(f64, Vec<Point2>)> {
 mod tests {
     use super::*;
 
-    /// Each way leaves and arrives in the directions asked for, has the length that its places have, and is bent no more than
-    /// its arcs; straight ahead it is straight.
+    /// Each way leaves and arrives in the directions asked for, has the length that its places have, and is
+    /// bent no more than its arcs; straight ahead it is straight.
     #[test]
     fn arcs_and_lines_join_two_poses() {
         let pose = |x: f64, y: f64, turn: f64| (Point2::new(x, y), Vector2::new(turn.cos(), turn.sin()));
@@ -259,8 +264,8 @@ mod tests {
         assert_eq!(back(&at(&[0, 1]), 0), []);
     }
 
-    /// Along a U that has been cleared: from the end of one leg to that of the other one there is no arc, and the way with corners
-    /// is little longer than the taut one around the two inner corners.
+    /// Along a U that has been cleared: from the end of one leg to that of the other one there is no arc, and
+    /// the way with corners is little longer than the taut one around the two inner corners.
     #[test]
     fn a_way_with_corners_goes_around_what_stands() {
         let corners =

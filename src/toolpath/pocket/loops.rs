@@ -1,7 +1,8 @@
 //! Loops that bound the engagement: circles that touch a way from one side.
 //!
-//! Enters: the way, the room of the cutter's centre, the ground cleared so far, the limit. Leaves: the loop from which the way goes on
-//! farthest, and the way back from where a loop ends; or the helix by which a way begins in stock; mm, rad.
+//! Enters: the way, the room of the cutter's centre, the ground cleared so far, the limit. Leaves: the loop
+//! from which the way goes on farthest, and the way back from where a loop ends; or the helix by which a way
+//! begins in stock; mm, rad.
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
@@ -131,7 +132,8 @@ pub(super) struct Loops<'a> {
     pub cleared: &'a Cleared,
     pub bounds: Turning,
     pub sides: Sides,
-    /// Where the last loop that could not be put in was above the limit, in sides from its beginning: others are asked there first.
+    /// Where the last loop that could not be put in was above the limit, in sides from its beginning: others
+    /// are asked there first.
     pub above_at: &'a Cell<usize>,
 }
 
@@ -240,8 +242,9 @@ mod tests {
     use super::*;
     use geometry::Piece;
 
-    /// A post of stock that two neighbouring places of a loop do not see, on the circumference of the cutter halfway between them,
-    /// 45 degrees ahead to the right: no loop goes there. One does where the post is beyond its reach.
+    /// A post of stock that two neighbouring places of a loop do not see, on the circumference of the cutter
+    /// halfway between them, 45 degrees ahead to the right: no loop goes there. One does where the post is
+    /// beyond its reach.
     #[test]
     fn loops_see_what_stands_between_their_places() {
         let (radius, rho) = (3.0, 1.5f64);

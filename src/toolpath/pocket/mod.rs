@@ -2,12 +2,13 @@
 //!
 //! Enters: the region, its depth, the cutter. Leaves: a program. The cutter's centre stays in the region
 //! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
-//! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from the inside outwards, so that only the first pass of
-//! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
-//! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
-//! the limit allows (`peel`, `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). What passes without
-//! a limit leave gets short ones of its own (`rest`). Every finished move keeps to the exact region (`walls`). The design's frame:
-//! z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from
+//! the inside outwards, so that only the first pass of each nest is a slot; each nest is entered by a helix
+//! where there is room, else by a ramp along its first pass. Where an engagement is asked for, passes go
+//! along the border of the stock instead, which they turn into as far as the limit allows (`peel`,
+//! `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). What passes without a
+//! limit leave gets short ones of its own (`rest`). Every finished move keeps to the exact region (`walls`).
+//! The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
 mod beginnings;
@@ -58,16 +59,18 @@ use work::monitor::{self, Monitor};
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
 
-/// Flats that are narrower than this over the stepover leave ridges between all passes, and nothing but ridges nearer to a pass than this over
-/// the stepover: between offsets around a square corner are 0.59 of it.
+/// Flats that are narrower than this over the stepover leave ridges between all passes, and nothing but
+/// ridges nearer to a pass than this over the stepover: between offsets around a square corner are 0.59 of
+/// it.
 const HALF_STEP: f64 = 0.51;
 const REST_OVER_STEP: f64 = 0.6;
 
 /// Longest move over the cutter's radius: feeds and engagement belong to moves.
 const MOVE_OVER_RADIUS: f64 = 0.5;
 
-/// Sides that are left out turn from the one instead by this much at most where the engagement is bounded, rad: it adds to the angle
-/// ahead. With what the angle may have more between two places it is what plans have to spare.
+/// Sides that are left out turn from the one instead by this much at most where the engagement is bounded,
+/// rad: it adds to the angle ahead. With what the angle may have more between two places it is what plans
+/// have to spare.
 const MOST_TURN: f64 = strategy::SPARE - cleared::BETWEEN;
 
 /// Sides of spirals and links over the stepover.
@@ -76,8 +79,8 @@ const SPACING: f64 = 0.25;
 /// Share of the chord tolerance that straight moves may be off the curves that they stand for.
 const CHORDS_SHARE: f64 = 0.5;
 
-/// What is left on walls for the decimals of the program, mm. Rounding cuts in by less than their last decimal, and no layer as
-/// thin as that stays along walls whose places have no more decimals.
+/// What is left on walls for the decimals of the program, mm. Rounding cuts in by less than their last
+/// decimal, and no layer as thin as that stays along walls whose places have no more decimals.
 const WRITTEN: f64 = 0.5 * ROUNDING;
 
 /// Precision of the largest cutter that an error names, mm.
@@ -227,7 +230,8 @@ impl Planner<'_> {
         let Self { cutter, strategy, step, monitor, .. } = *self;
         let helix = self.air.is_none();
         let mut runs = piece_runs(piece, cutter, strategy, step, helix, &mut self.planned, monitor)?;
-        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
+        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from
+        // elsewhere.
         if self.rules.is_some() {
             return Ok(runs);
         }

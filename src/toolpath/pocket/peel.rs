@@ -1,13 +1,14 @@
 //! Passes of constant engagement: the stock peeled off along its border.
 //!
-//! Enters: the piece of the cutter's centre, the ground cleared so far, a way that has been cut. Leaves: that way, gone on.
-//! At each step the cutter turns as far into the stock, which is on its right, as the limit of the engagement lets it, and
-//! along walls that it meets. So passes wind around what is cleared, have no cusps, and cut as much as they may. A pass ends
-//! where nothing is left to cut, or where no turn keeps to the limit. The next one begins beside the nearest stock, on a way
-//! that was gone before, and is reached over cleared ground; mm, rad.
+//! Enters: the piece of the cutter's centre, the ground cleared so far, a way that has been cut. Leaves: that
+//! way, gone on. At each step the cutter turns as far into the stock, which is on its right, as the limit of
+//! the engagement lets it, and along walls that it meets. So passes wind around what is cleared, have no
+//! cusps, and cut as much as they may. A pass ends where nothing is left to cut, or where no turn keeps to
+//! the limit. The next one begins beside the nearest stock, on a way that was gone before, and is reached
+//! over cleared ground; mm, rad.
 //!
-//! Every place of a pass is asked for the angle in stock ([`Cleared`]) before the cutter goes there, and whatever is left
-//! (the tips of corners, narrow necks) is what runs along the walls find.
+//! Every place of a pass is asked for the angle in stock ([`Cleared`]) before the cutter goes there, and
+//! whatever is left (the tips of corners, narrow necks) is what runs along the walls find.
 
 use std::cell::Cell;
 
@@ -32,7 +33,8 @@ const SHORTEST: f64 = 0.02;
 /// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
 const NEAR: f64 = 0.006;
 
-/// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and the angle changes fast.
+/// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and
+/// the angle changes fast.
 const CORNERS: f64 = 0.01;
 
 /// Turns that are tried for one step at most.
@@ -47,15 +49,17 @@ const STOCK: f64 = 0.02;
 /// Places this far behind, over the radius, are beside the move's own chip.
 const FRESH: f64 = 0.5;
 
-/// A pass ends when it cut nothing over so long a way, over the radius: the first less the second for each radius of a pass's width.
-/// Wide passes that go on for longer gain less than links take, narrow ones leave bits to the loops when they end too soon.
+/// A pass ends when it cut nothing over so long a way, over the radius: the first less the second for each
+/// radius of a pass's width. Wide passes that go on for longer gain less than links take, narrow ones leave
+/// bits to the loops when they end too soon.
 const FREE: [f64; 2] = [0.3, 0.3];
 const LEAST_FREE: f64 = 0.1;
 
 /// Passes that cut along a way shorter than this over the radius are none.
 const LEAST_CUT: f64 = 0.1;
 
-/// A pass that no step leads on from, so long after its beginning over the radius, is tried again with more care.
+/// A pass that no step leads on from, so long after its beginning over the radius, is tried again with more
+/// care.
 const SOON: f64 = 1.5;
 
 /// Places where passes may begin are this far apart over the radius.
@@ -150,7 +154,8 @@ impl<'a> Peeler<'a> {
         Ok(())
     }
 
-    /// Takes back places from which no pass came through where ground was cleared since; whether there are any.
+    /// Takes back places from which no pass came through where ground was cleared since; whether there are
+    /// any.
     pub fn take_back(&mut self) -> bool {
         self.places.take_back()
     }
@@ -217,8 +222,8 @@ impl<'a> Peeler<'a> {
         arc(right) > STOCK || arc(-right) > STOCK
     }
 
-    /// Where the next pass begins: the first place with stock of the stretch that is nearest. Places without stock are
-    /// forgotten.
+    /// Where the next pass begins: the first place with stock of the stretch that is nearest. Places without
+    /// stock are forgotten.
     fn next_place(&mut self) -> Option<usize> {
         let end = *self.out.last()?;
         loop {
@@ -239,7 +244,8 @@ impl<'a> Peeler<'a> {
         }
     }
 
-    /// Where a pass from a place begins: at the first of the places of its way right before it that have stock beside them.
+    /// Where a pass from a place begins: at the first of the places of its way right before it that have
+    /// stock beside them.
     fn beginning(&self, place: usize) -> (usize, Vector2) {
         let Beginning { index, heading, .. } = *self.places.get(place);
         let mut begin = (index, heading);
@@ -253,8 +259,8 @@ impl<'a> Peeler<'a> {
         begin
     }
 
-    /// The way over cleared ground to a place of the way, which is to be left in the direction `heading`. What was cleared `since` so
-    /// many places is not there yet.
+    /// The way over cleared ground to a place of the way, which is to be left in the direction `heading`.
+    /// What was cleared `since` so many places is not there yet.
     fn link_to(&mut self, index: usize, heading: Vector2, since: usize) -> Vec<Point2> {
         let later = self.cleared.split_off(since);
         let (room, cleared, visited) = (self.room, &*self.cleared, &self.visited);
@@ -264,7 +270,8 @@ impl<'a> Peeler<'a> {
         link
     }
 
-    /// How many places of earlier passes are beside the chip of one that began here and has `gone` so far, mm, after a straight link.
+    /// How many places of earlier passes are beside the chip of one that began here and has `gone` so far,
+    /// mm, after a straight link.
     fn recent(&self, begin: &Point2, gone: f64) -> usize {
         let mut left = FRESH * self.radius - gone - self.out.last().map_or(0.0, |end| (begin - end).norm());
         let back = self.out.windows(2).rev().map(|w| (w[1] - w[0]).norm());
@@ -392,7 +399,8 @@ impl<'a> Peeler<'a> {
             far = Some(found);
         }
         let goal = limit - 0.5 * NEAR;
-        // The angle grows by the turn, and as the tool comes nearer to the border of the stock, which is as far off as the way.
+        // The angle grows by the turn, and as the tool comes nearer to the border of the stock, which is as
+        // far off as the way.
         let by_growth = |found: &Step| {
             let growth = 1.0 + (step / self.radius + found.turn).max(0.0) / limit.sin();
             found.turn + (found.arc - goal) / growth

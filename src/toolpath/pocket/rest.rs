@@ -1,8 +1,8 @@
 //! Where stock may still stand.
 //!
-//! Enters: a piece of the cutter's centre, ways that were gone. Leaves: runs to places where stock may stand, and the place deep in
-//! stock with most room. Whether stock may stand is told by square cells: the middle of one, and all around it, is cleared for
-//! sure where one disc holds it whole; mm.
+//! Enters: a piece of the cutter's centre, ways that were gone. Leaves: runs to places where stock may stand,
+//! and the place deep in stock with most room. Whether stock may stand is told by square cells: the middle of
+//! one, and all around it, is cleared for sure where one disc holds it whole; mm.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -22,8 +22,8 @@ const MOST_CELLS: f64 = 2048.0;
 /// Places along a side of a cell that are asked whether they stand.
 const PLACES: i32 = 15;
 
-/// Runs to what stands on the floor of a piece after others, under a cutter whose bottom is level up to a `radius`, mm. None where that is so
-/// small, or the piece so large, that cells cannot tell.
+/// Runs to what stands on the floor of a piece after others, under a cutter whose bottom is level up to a
+/// `radius`, mm. None where that is so small, or the piece so large, that cells cannot tell.
 pub(super) fn runs_to_rest(
     piece: &Piece,
     gone: &[Run],
@@ -109,7 +109,8 @@ impl Cells {
         }
     }
 
-    /// Of the places where the cutter would stand in stock all around, the one with most room, `least` or more.
+    /// Of the places where the cutter would stand in stock all around, the one with most room, `least` or
+    /// more.
     pub fn deep_in_stock(
         &self,
         room: &Room,
@@ -133,7 +134,8 @@ impl Cells {
         Ok(best.map(|best| best.1))
     }
 
-    /// Runs from the ways that were gone straight to cells that may hold stock; `stands` tells where in one, if anywhere.
+    /// Runs from the ways that were gone straight to cells that may hold stock; `stands` tells where in one,
+    /// if anywhere.
     pub fn runs_to_standing(
         &mut self,
         gone: &[Run],

@@ -1,4 +1,5 @@
-//! The pocket itself: its region, over which sides the cutter may leave, what a larger cutter took before; mm.
+//! The pocket itself: its region, over which sides the cutter may leave, what a larger cutter took before;
+//! mm.
 
 use super::{Cutter, Region};
 use geometry::{
@@ -6,14 +7,16 @@ use geometry::{
 };
 use work::monitor::{Cancelled, Monitor};
 
-/// How far beyond an open side there is room, over the cutter's radius: it leaves the stock whole, and turns there.
+/// How far beyond an open side there is room, over the cutter's radius: it leaves the stock whole, and turns
+/// there.
 const BEYOND: f64 = 2.6;
 
 /// What is no farther from a wall than this, mm, is on it: far above rounding, far below any tolerance.
 const ON_WALL: f64 = 1.0e-5;
 
-/// What lies beyond open sides laps over the region, and one strip over the next, by so much over the cutter's radius or over the length of
-/// the side where that is short. Borders that only touch come apart by the rounding of booleans, and no cutter passes a crack.
+/// What lies beyond open sides laps over the region, and one strip over the next, by so much over the
+/// cutter's radius or over the length of the side where that is short. Borders that only touch come apart by
+/// the rounding of booleans, and no cutter passes a crack.
 const LAP: f64 = 0.01;
 const LAP_OF_SIDE: f64 = 0.02;
 
@@ -23,8 +26,8 @@ const TAPER: f64 = 0.25;
 /// Sides of the rounds between strips beyond open sides, rad.
 const ROUND: f64 = 0.2;
 
-/// Places along a wall that are asked whether the cutter fits there are no farther apart than this share of its radius, and where that
-/// changes it is found by so many halvings.
+/// Places along a wall that are asked whether the cutter fits there are no farther apart than this share of
+/// its radius, and where that changes it is found by so many halvings.
 const WALL_STEP: f64 = 0.01;
 const HALVINGS: usize = 30;
 
@@ -71,8 +74,8 @@ impl Pocket {
         }
     }
 
-    /// With those sides open that lie along `lines`, within `tolerance` mm, for a cutter of a radius. Sides are divided where
-    /// a line ends.
+    /// With those sides open that lie along `lines`, within `tolerance` mm, for a cutter of a radius. Sides
+    /// are divided where a line ends.
     ///
     /// # Errors
     /// [`NotOnOutline`]
@@ -106,7 +109,8 @@ impl Pocket {
         Ok(self)
     }
 
-    /// With no stock beyond its open sides as far as `width` mm either, if that is farther than a cutter of a radius goes by itself.
+    /// With no stock beyond its open sides as far as `width` mm either, if that is farther than a cutter of a
+    /// radius goes by itself.
     #[must_use]
     pub fn without_stock_beyond(mut self, width: f64, radius: f64) -> Self {
         if !self.open.is_empty() && width > BEYOND * radius {
@@ -125,8 +129,8 @@ impl Pocket {
             strips(&sides, is_open, &Strip { width, longer: 0.0, lap: LAP * radius }, &mut open);
             walls.extend(sides.into_iter().filter(|side| !is_open(side)));
         }
-        // Behind a wall that stands beyond an open side, no farther: around the end of a thin one there is room. What lies behind others
-        // is parted from there by stock, or by the pocket itself.
+        // Behind a wall that stands beyond an open side, no farther: around the end of a thin one there is
+        // room. What lies behind others is parted from there by stock, or by the pocket itself.
         for wall in walls.iter().filter(|wall| open.iter().any(|strip| meets(strip, wall))) {
             // Where a wall ends at an open side nothing is taken from the lap.
             let behind = Strip { width, longer: -2.0 * LAP * radius, lap: 0.0 };
@@ -149,7 +153,8 @@ impl Pocket {
         &self.free
     }
 
-    /// What may be swept without a cut into walls, also by moves that come from farther away than planned ones.
+    /// What may be swept without a cut into walls, also by moves that come from farther away than planned
+    /// ones.
     pub fn room(&self) -> Region {
         if self.farther.is_empty() { self.free.clone() } else { self.free.union(&self.farther) }
     }
@@ -187,14 +192,14 @@ impl Pocket {
         self.region.curves().map(around).sum::<f64>() - open
     }
 
-    /// Length of its walls that a cutter of a radius touches from some place where it fits, mm, but for what their chords are off the
-    /// curves: beside sharp corners it does not come to them.
+    /// Length of its walls that a cutter of a radius touches from some place where it fits, mm, but for what
+    /// their chords are off the curves: beside sharp corners it does not come to them.
     pub fn reached_wall_length(&self, radius: f64) -> f64 {
         self.reached_walls(radius).iter().map(WallStretch::length).sum()
     }
 
-    /// The walls that a cutter of a radius touches from some place where it fits, as [`Self::reached_wall_length`] counts them, and the
-    /// edges that it goes around.
+    /// The walls that a cutter of a radius touches from some place where it fits, as
+    /// [`Self::reached_wall_length`] counts them, and the edges that it goes around.
     pub fn reached_walls(&self, radius: f64) -> Vec<WallStretch> {
         let centres = RegionIndex::new(self.free.inset(radius));
         if centres.region().is_empty() {
@@ -210,7 +215,8 @@ impl Pocket {
                 let Some(inward) = left(&[a, b]).filter(|_| !self.open.contains(&[a, b])) else { continue };
                 let at = |share: f64| a + (b - a) * share;
                 let places = ((b - a).norm() / (WALL_STEP * radius)).ceil();
-                // A cutter that touches no more than the end of a side, from beyond it, does not come to the side.
+                // A cutter that touches no more than the end of a side, from beyond it, does not come to the
+                // side.
                 let touches = |place: &Point2| {
                     let sides = centres.sides();
                     let nearest = sides.nearest(place).filter(|near| near.distance <= radius + off);
@@ -245,8 +251,8 @@ impl Pocket {
         found
     }
 
-    /// Ground beyond the open sides that a cutter of a radius may meet, also beyond the walls at their ends: planning asks for
-    /// it only where walls let the cutter come.
+    /// Ground beyond the open sides that a cutter of a radius may meet, also beyond the walls at their ends:
+    /// planning asks for it only where walls let the cutter come.
     pub(super) fn ground_beyond(&self, radius: f64) -> Region {
         let mut pieces = Vec::new();
         for side in &self.open {
@@ -256,8 +262,8 @@ impl Pocket {
         Region { pieces }.without(&self.region)
     }
 
-    /// The floor that a cutter can reach, what the flat of its bottom sweeps of the region, but for what is nearer than `clear`
-    /// mm to its walls.
+    /// The floor that a cutter can reach, what the flat of its bottom sweeps of the region, but for what is
+    /// nearer than `clear` mm to its walls.
     pub fn reachable_floor(&self, cutter: &Cutter, clear: f64) -> Region {
         let (centres, by) = (self.free.inset(cutter.radius()), cutter.flat_radius() - clear);
         self.within(if by < 0.0 { centres.inset(-by) } else { centres.grown(by) })
@@ -301,8 +307,8 @@ fn meets(piece: &Piece, side: &[Point2; 2]) -> bool {
     piece.contains(&side[0]) || (0..outer.len()).any(near)
 }
 
-/// The stretches of a way from 0 to 1 on which something fits. It is asked at so many places, and where that changes between two of them it
-/// is found by halving.
+/// The stretches of a way from 0 to 1 on which something fits. It is asked at so many places, and where that
+/// changes between two of them it is found by halving.
 fn fitting(places: f64, fits: impl Fn(f64) -> bool) -> Vec<[f64; 2]> {
     let places = places.max(1.0);
     let mut found: Vec<[f64; 2]> = Vec::new();
@@ -333,7 +339,8 @@ fn fitting(places: f64, fits: impl Fn(f64) -> bool) -> Vec<[f64; 2]> {
     found
 }
 
-/// The first place of a drawn line that does not lie within `tolerance` of the sides along it, if there is one. Sides end where it does.
+/// The first place of a drawn line that does not lie within `tolerance` of the sides along it, if there is
+/// one. Sides end where it does.
 fn off_outline(region: &Region, line: [Point2; 2], tolerance: f64) -> Option<Point2> {
     let length = (line[1] - line[0]).norm();
     let along = |side: [Point2; 2]| {
@@ -418,7 +425,8 @@ mod tests {
         c.iter().map(|&(x, y)| Point2::new(x, y)).collect()
     }
 
-    /// Beside a square corner it does not come to the last `r` mm of each wall; it comes to all of a round hole and around an island.
+    /// Beside a square corner it does not come to the last `r` mm of each wall; it comes to all of a round
+    /// hole and around an island.
     #[test]
     fn the_cutter_comes_to_walls_where_it_fits() {
         let reached = square().reached_wall_length(3.0);
@@ -440,7 +448,8 @@ mod tests {
         assert_eq!(slot.reached_wall_length(5.1), 0.0);
     }
 
-    /// Beside an island is no room for it, and it turns above the corner: of that side it touches no more than the end.
+    /// Beside an island is no room for it, and it turns above the corner: of that side it touches no more
+    /// than the end.
     #[test]
     fn a_side_that_it_touches_at_its_end_alone_is_not_reached() {
         let outline =
@@ -500,8 +509,9 @@ mod tests {
         assert_eq!((across.line, across.at), (0, Point2::new(10.0, 12.5)));
     }
 
-    /// Two open sides with the corner between them, turned to any angle, with and without a place of a line amid a side, and the open half
-    /// of a round: the room beyond has no cracks, so that the cutter comes into all that is open.
+    /// Two open sides with the corner between them, turned to any angle, with and without a place of a line
+    /// amid a side, and the open half of a round: the room beyond has no cracks, so that the cutter comes
+    /// into all that is open.
     #[test]
     fn open_sides_stay_open_at_any_angle() {
         let r = 6.0;
@@ -566,7 +576,8 @@ mod tests {
         assert!(pocket.free().contains(&Point2::new(31.0, 7.9)));
     }
 
-    /// A thin wall that is not square to the open side beside its end: its far side leads no way into the room beyond.
+    /// A thin wall that is not square to the open side beside its end: its far side leads no way into the
+    /// room beyond.
     #[test]
     fn walls_askew_leave_the_room_beyond_an_open_side() {
         let outline = points(&[

@@ -53,8 +53,8 @@ impl Pattern {
     }
 }
 
-/// Planned for less by this, rad, which is what sides of polylines, films and the parts in which angles are told apart add.
-/// Loops alone, whose sides turn, need more.
+/// Planned for less by this, rad, which is what sides of polylines, films and the parts in which angles are
+/// told apart add. Loops alone, whose sides turn, need more.
 pub(super) const SPARE: f64 = 0.025;
 const SPARE_OF_LOOPS: f64 = 0.04;
 
@@ -108,8 +108,8 @@ const LEAST_HELIX: f64 = 0.2;
 /// Stepover over the cutter's diameter by default: 78 degrees of engagement.
 const STEPOVER_OVER_DIAMETER: f64 = 0.4;
 
-/// Stepover over the radius up to which the bottom lies lower than the scallop, by default: turns of passes leave more between them than
-/// half of the stepover. And the least over the cutter's radius.
+/// Stepover over the radius up to which the bottom lies lower than the scallop, by default: turns of passes
+/// leave more between them than half of the stepover. And the least over the cutter's radius.
 const STEPOVER_OVER_LOW: f64 = 1.6;
 const LEAST_STEPOVER: f64 = 0.02;
 
@@ -252,7 +252,8 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
     }))
 }
 
-/// The stepover of a pocket's toolpath. By default the ridges that the round of the corner leaves between passes stay below `scallop` mm.
+/// The stepover of a pocket's toolpath. By default the ridges that the round of the corner leaves between
+/// passes stay below `scallop` mm.
 ///
 /// # Errors
 /// A stepover that leaves material between passes.

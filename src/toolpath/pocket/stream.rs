@@ -1,11 +1,12 @@
-//! Passes of a pocket along the levels of a stream function that follows feed directions: open ones from wall to wall, closed
-//! ones around islands.
+//! Passes of a pocket along the levels of a stream function that follows feed directions: open ones from wall
+//! to wall, closed ones around islands.
 //!
-//! Enters: the piece where the cutter's centre may be, directions, the stepover. Leaves: runs, and what they were planned by.
-//! Directions stand on triangles that fill the piece, and ψ is fitted to them as on the mesh of a surface
-//! ([`field::mesh::solve_stream`]). Where passes shall run along the walls, ψ has one value along each of them, which is found for
-//! islands, so that no pass ends at a wall: with the direction of the walls themselves that is the flow that nothing forces.
-//! Walls are gone around last. The floor of the design's frame is level, so that z plays no part; mm.
+//! Enters: the piece where the cutter's centre may be, directions, the stepover. Leaves: runs, and what they
+//! were planned by. Directions stand on triangles that fill the piece, and ψ is fitted to them as on the mesh
+//! of a surface ([`field::mesh::solve_stream`]). Where passes shall run along the walls, ψ has one value
+//! along each of them, which is found for islands, so that no pass ends at a wall: with the direction of the
+//! walls themselves that is the flow that nothing forces. Walls are gone around last. The floor of the
+//! design's frame is level, so that z plays no part; mm.
 
 use super::lines::{Line, along_walls, is_clear};
 use super::nest::{NestError, planar_mesh};
@@ -23,8 +24,8 @@ use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, singu
 use geometry::{Piece, Point2, Point3, SegmentGrid, Vector2, Vector3};
 use work::monitor::{Cancelled, Monitor};
 
-/// Side of the triangles over the stepover. On longer ones levels stray from streamlines by more than a usual chord tolerance;
-/// time grows with the inverse square.
+/// Side of the triangles over the stepover. On longer ones levels stray from streamlines by more than a usual
+/// chord tolerance; time grows with the inverse square.
 const EDGE_OVER_STEP: f64 = 0.2;
 
 /// Points of passes over the stepover.
@@ -33,7 +34,8 @@ const SAMPLING: f64 = 0.1;
 /// Singular points nearer than this many radii of the cutter count as one.
 const MERGE_OVER_RADIUS: f64 = 1.0;
 
-/// A function that rises by less than this over what its directions ask for, on average, follows none of them: its levels are noise.
+/// A function that rises by less than this over what its directions ask for, on average, follows none of
+/// them: its levels are noise.
 const LEAST_FOLLOWED: f64 = 0.02;
 
 /// Streamlines of a pocket.
@@ -139,7 +141,8 @@ impl Fitted {
     }
 }
 
-/// Runs along the passes: open ones one after the other, closed ones from the middle outwards, then around each wall.
+/// Runs along the passes: open ones one after the other, closed ones from the middle outwards, then around
+/// each wall.
 fn joined(passes: &[Vec<Point3>], piece: &Piece, step: f64) -> Vec<Run> {
     let walls = SegmentGrid::of_curves(piece.curves());
     let plane = |pass: &Vec<Point3>| pass.iter().map(|p| p.xy()).collect::<Vec<Point2>>();
@@ -157,7 +160,8 @@ fn joined(passes: &[Vec<Point3>], piece: &Piece, step: f64) -> Vec<Run> {
     along_walls(lines.collect(), runs, piece, step, |_, _| true)
 }
 
-/// A closed curve, its last point left out, with what lies farther from the walls, and is cut first, on its left.
+/// A closed curve, its last point left out, with what lies farther from the walls, and is cut first, on its
+/// left.
 fn climbing(mut curve: Vec<Point2>, walls: &SegmentGrid) -> Vec<Point2> {
     curve.pop();
     let mut left = 0.0;
@@ -173,7 +177,8 @@ fn climbing(mut curve: Vec<Point2>, walls: &SegmentGrid) -> Vec<Point2> {
     curve
 }
 
-/// Goes around a closed curve: on from the last run where that ends nearby, with nothing between, or else by a run of its own.
+/// Goes around a closed curve: on from the last run where that ends nearby, with nothing between, or else by
+/// a run of its own.
 fn around(runs: &mut Vec<Run>, curve: &[Point2], piece: &Piece, walls: &SegmentGrid, step: f64) {
     /// A way to the next curve is at most so many stepovers long.
     const LONGEST_LINK: f64 = 4.0;

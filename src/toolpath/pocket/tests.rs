@@ -229,7 +229,8 @@ fn steps_go_down_evenly_and_the_floor_has_its_own() {
     assert_eq!(descend::floors([1.5, 6.0], &s), [-1.0, -3.5, -6.0]);
 }
 
-/// A bull nose with next to no flat leaves ridges between its passes, by the stepover. No pass of its own goes along each of them.
+/// A bull nose with next to no flat leaves ridges between its passes, by the stepover. No pass of its own
+/// goes along each of them.
 #[test]
 fn ridges_of_a_narrow_flat_are_no_rest() {
     let triangle = [(23.0, 15.0), (31.0, 17.0), (27.0, 23.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
@@ -246,9 +247,10 @@ fn ridges_of_a_narrow_flat_are_no_rest() {
     }
 }
 
-/// Several steps with both allowances: until the passes along the walls the allowance stands there, also below what the floor is
-/// left; only the last step comes to the floor; all is cleared in the end. Passes along walls are one for each step and wall, or
-/// one for each wall, which then comes last and leaves no marks of steps.
+/// Several steps with both allowances: until the passes along the walls the allowance stands there, also
+/// below what the floor is left; only the last step comes to the floor; all is cleared in the end. Passes
+/// along walls are one for each step and wall, or one for each wall, which then comes last and leaves no
+/// marks of steps.
 #[test]
 fn floor_and_walls_are_finished_from_their_allowances() {
     let (cutter, pocket) = (Cutter::flat(6.0).unwrap(), with_island());
@@ -342,7 +344,8 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
 }
 
-/// Directions straight across a pocket, and one value along each wall: both together leave no function but a level one, whose lines are noise.
+/// Directions straight across a pocket, and one value along each wall: both together leave no function but a
+/// level one, whose lines are noise.
 #[test]
 fn directions_across_do_not_run_along_walls() {
     let island = rectangle(10.0, 5.0, 14.0, 9.0);
@@ -359,8 +362,8 @@ fn directions_across_do_not_run_along_walls() {
     assert!(planned(FeedDirection::Border(Sense::Along), true).is_ok());
 }
 
-/// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and streamlines traced by
-/// Runge and Kutta's method stay on them within the chord tolerance.
+/// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and
+/// streamlines traced by Runge and Kutta's method stay on them within the chord tolerance.
 #[test]
 fn streamlines_around_an_island_are_the_traced_ones() {
     let pocket = pocket(vec![disc(0.0, 0.0, 30.0), disc(0.0, 0.0, 6.0)]);
@@ -400,7 +403,8 @@ fn streamlines_around_an_island_are_the_traced_ones() {
     assert!(worst <= chord, "{worst}");
 }
 
-/// Passes of a pocket along traced lines lie no farther apart than levels do: around singular points both leave gaps.
+/// Passes of a pocket along traced lines lie no farther apart than levels do: around singular points both
+/// leave gaps.
 #[test]
 fn traced_lines_fill_a_pocket() {
     let cutter = Cutter::flat(6.0).unwrap();

@@ -3,8 +3,8 @@
 //! Enters: the angle of the circumference that may stand in stock, the cutter's radius, the curvature of a
 //! pass. Leaves: how far the pass may be from the one before; mm, rad.
 //!
-//! A loop costs many times its advance, so a pass beside cleared ground should need none. Stepovers therefore follow the law
-//! of cosines where passes turn, and inner offsets have round corners.
+//! A loop costs many times its advance, so a pass beside cleared ground should need none. Stepovers therefore
+//! follow the law of cosines where passes turn, and inner offsets have round corners.
 
 use super::nest::closed_length;
 use geometry::Point2;

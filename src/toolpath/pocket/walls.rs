@@ -1,8 +1,9 @@
 //! Ways kept to where the cutter's centre may be.
 //!
-//! Enters: the piece of the centre, the exact region, a way. Leaves: the same way, in the piece: where it would leave, it
-//! follows the wall of the piece instead; and whether a straight move keeps the cutter out of the region's walls. Links are
-//! bends between curves and level curves come from triangles, so neither keeps to walls by itself; mm.
+//! Enters: the piece of the centre, the exact region, a way. Leaves: the same way, in the piece: where it
+//! would leave, it follows the wall of the piece instead; and whether a straight move keeps the cutter out of
+//! the region's walls. Links are bends between curves and level curves come from triangles, so neither keeps
+//! to walls by itself; mm.
 
 use super::route::{Entry, Run};
 use geometry::{NearestSegment, Piece, Point2, Region, SegmentGrid, Vector2, distance_of_segments};
@@ -94,7 +95,8 @@ impl<'a> Room<'a> {
         a + (b - a) * near.share
     }
 
-    /// Whether the piece contains a place: it lies on the left of its sides. At a corner of two sides all of them are asked.
+    /// Whether the piece contains a place: it lies on the left of its sides. At a corner of two sides all of
+    /// them are asked.
     fn contains(&self, p: &Point2, near: &NearestSegment) -> bool {
         /// Nearer to an end of a side, as a share of it, the place may be beside the next one.
         const END: f64 = 1e-6;
@@ -154,7 +156,8 @@ impl<'a> Room<'a> {
         stretches.filter(|c| self.is_outside(&middle(c))).collect()
     }
 
-    /// The shorter way along a wall between two places on it, ends included; `None` where they are on two walls.
+    /// The shorter way along a wall between two places on it, ends included; `None` where they are on two
+    /// walls.
     fn along_wall(&self, ends: &[Point2; 2]) -> Option<Vec<Point2>> {
         let [from, to] = [self.walls.nearest(&ends[0])?, self.walls.nearest(&ends[1])?];
         let [first, last] = [from.segment, to.segment].map(|k| self.walls.segments()[k as usize]);
@@ -180,11 +183,13 @@ impl<'a> Room<'a> {
     }
 }
 
-/// An inset of `region` by `radius` whose round corners are chords between places on the circle: each chord becomes the two
-/// tangents at its ends. So no side comes nearer to a wall than the radius, and straight ones stand just there.
+/// An inset of `region` by `radius` whose round corners are chords between places on the circle: each chord
+/// becomes the two tangents at its ends. So no side comes nearer to a wall than the radius, and straight ones
+/// stand just there.
 pub(super) fn tangent(inset: Region, region: &Region, radius: f64) -> Region {
     let walls = SegmentGrid::of_curves(region.curves());
-    // The nearest place of the walls where a chord comes nearer than the radius, and which of its ends are on the circle.
+    // The nearest place of the walls where a chord comes nearer than the radius, and which of its ends are on
+    // the circle.
     let chord = |a: &Point2, b: &Point2| {
         let middle = nalgebra::center(a, b);
         let near = walls.nearest(&middle).filter(|near| near.distance < radius - ROUNDING)?;

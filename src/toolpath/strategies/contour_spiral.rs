@@ -1,9 +1,11 @@
-//! One spiral between the passes of an iso-scallop path from all borders (a morph spiral): a single pass without retracts.
+//! One spiral between the passes of an iso-scallop path from all borders (a morph spiral): a single pass
+//! without retracts.
 //!
-//! The front from the border gives closed levels, one inside the other. Places of neighbouring levels with the same share
-//! of their length correspond; on its way once around the spiral moves evenly from one level to the next, and every place
-//! of it is put onto its own level, so that turns keep the distance of levels. At the corners of its turns, where that
-//! distance is less than that of the turns, further short passes run halfway.
+//! The front from the border gives closed levels, one inside the other. Places of neighbouring levels with
+//! the same share of their length correspond; on its way once around the spiral moves evenly from one level
+//! to the next, and every place of it is put onto its own level, so that turns keep the distance of levels.
+//! At the corners of its turns, where that distance is less than that of the turns, further short passes run
+//! halfway.
 //!
 //! Limits: the levels must be single closed curves up to the middle; a front that parts is refused.
 
@@ -23,11 +25,12 @@ const TRACE_CELLS: usize = 240;
 /// Levels this close to the middle may be missing: their curves are smaller than the grid's cells.
 const MISSING_TURNS: usize = 2;
 
-/// Turns may be this share of their distance wider apart than allowed before a further pass is put in between.
+/// Turns may be this share of their distance wider apart than allowed before a further pass is put in
+/// between.
 const SLACK: f64 = 0.02;
 
-/// How often the distance of two turns is halved by further passes. Corners of right angles need one halving, sharper ones
-/// two.
+/// How often the distance of two turns is halved by further passes. Corners of right angles need one halving,
+/// sharper ones two.
 const HALVINGS: usize = 3;
 
 /// Places looked at from one point of a turn to the next.
@@ -36,8 +39,8 @@ const PARTS: usize = 8;
 /// Further passes reach beyond the stretch that needs them by this many strip widths.
 const OVERLAP: f64 = 1.0;
 
-/// A place of the spiral may be this many turns off the line between its two levels; farther, it was put onto another
-/// branch.
+/// A place of the spiral may be this many turns off the line between its two levels; farther, it was put onto
+/// another branch.
 const MOST_STRAY: f64 = 1.0;
 
 /// Plans one spiral on each patch.
@@ -92,7 +95,8 @@ fn on_chart(task: &Task<'_>, chart: &Chart) -> Result<Passes, PlanError> {
     Ok(Passes { passes, notes, ..Passes::default() })
 }
 
-/// The point at `s` of a polyline whose points have the parameters 0, 1, 2, …, rounded through them (Catmull–Rom).
+/// The point at `s` of a polyline whose points have the parameters 0, 1, 2, …, rounded through them
+/// (Catmull–Rom).
 fn between(points: &[[f64; 2]], s: f64) -> [f64; 2] {
     let k = (s.max(0.0) as usize).min(points.len() - 2);
     let t = s - k as f64;
@@ -104,7 +108,8 @@ fn between(points: &[[f64; 2]], s: f64) -> [f64; 2] {
     })
 }
 
-/// Closed levels from the border to the middle, all in the same sense, each beginning near where the one before does.
+/// Closed levels from the border to the middle, all in the same sense, each beginning near where the one
+/// before does.
 struct Levels {
     /// φ from one to the next; the first is half of it from the border.
     step: f64,
@@ -246,7 +251,8 @@ impl Spiral<'_> {
         runs
     }
 
-    /// The runs of the way `offset` turns inside of turn `k` on which passes `interval` levels apart are too far apart.
+    /// The runs of the way `offset` turns inside of turn `k` on which passes `interval` levels apart are too
+    /// far apart.
     fn needed(&self, k: usize, offset: f64, interval: f64) -> Vec<Vec<[f64; 2]>> {
         let n = self.samples(k);
         let points: Vec<[f64; 2]> = (0..=n)

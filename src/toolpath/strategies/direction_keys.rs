@@ -32,8 +32,9 @@ pub(crate) fn read_weight(section: &Section<'_>) -> Result<f64, SceneError> {
     Ok(weight.map_or(DIRECTION_WEIGHT, |weight| weight.value))
 }
 
-/// Reads a direction and the files that it names, in order; what these hold is read later. `None` for the shortest path, which
-/// is asked for where nothing is said of directions, and no other key needs one (`needed`).
+/// Reads a direction and the files that it names, in order; what these hold is read later. `None` for the
+/// shortest path, which is asked for where nothing is said of directions, and no other key needs one
+/// (`needed`).
 pub(crate) fn read(
     section: &Section<'_>,
     files: &mut Vec<Located<String>>,
@@ -164,7 +165,8 @@ fn read_blend(
     Ok(FeedDirection::Blend(parts.iter().map(read_part).collect::<Result<_, SceneError>>()?))
 }
 
-/// `direction = ...` and the keys that belong to it, joined by `separator`: lines of a toolpath, or entries of a table.
+/// `direction = ...` and the keys that belong to it, joined by `separator`: lines of a toolpath, or entries
+/// of a table.
 pub(crate) fn write(out: &mut String, direction: &FeedDirection, separator: &str) -> fmt::Result {
     let across = |sense: Sense| format!("across = {}", sense == Sense::Across);
     let word = |out: &mut String, word: &str| write!(out, "direction = \"{word}\"");

@@ -1,4 +1,5 @@
-//! Isoparametric lines: one parameter grows along a pass, the other one is the function whose levels passes are.
+//! Isoparametric lines: one parameter grows along a pass, the other one is the function whose levels passes
+//! are.
 
 use std::fmt::{self, Write as _};
 
@@ -59,8 +60,8 @@ impl Strategy for IsoParametric {
     }
 }
 
-/// Passes along isoparametric lines, with levels placed in a given way; without `along` whichever of the two families
-/// is shorter on all patches together.
+/// Passes along isoparametric lines, with levels placed in a given way; without `along` whichever of the two
+/// families is shorter on all patches together.
 fn passes(task: &Task<'_>, along: Option<Along>, placing: LevelSteps) -> Result<Passes, PlanError> {
     if let Some(along) = along {
         return passes_along(task, along, placing);

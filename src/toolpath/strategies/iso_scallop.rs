@@ -1,15 +1,18 @@
-//! Iso-scallop passes: each exactly one strip width from the one before, measured on the surface across the feed.
+//! Iso-scallop passes: each exactly one strip width from the one before, measured on the surface across the
+//! feed.
 //!
 //! A front starts on a curve and moves by the strip width of its place and direction while φ grows by one
 //! (`speed |∇φ| = 1`, see [`field::eikonal`]); levels of φ one apart are the passes. The path is as long as
-//! `∫ (1 − κ r) dA/w(across)`, κ the curvature along the feed, so the start curve decides the directions and with them the length.
+//! `∫ (1 − κ r) dA/w(across)`, κ the curvature along the feed, so the start curve decides the directions and
+//! with them the length.
 //!
-//! Where the strip is much wider across some feed directions than across others (a leaning flat or bull nose end mill on ground
-//! nearly as hollow as the cutter), fronts may break into corners of their own without end, and passes would run to and fro.
-//! Then they move by the convex hull of their slowness ([`field::Front::convex`]): intervals are nowhere wider, and the path is shorter.
+//! Where the strip is much wider across some feed directions than across others (a leaning flat or bull nose
+//! end mill on ground nearly as hollow as the cutter), fronts may break into corners of their own without
+//! end, and passes would run to and fro. Then they move by the convex hull of their slowness
+//! ([`field::Front::convex`]): intervals are nowhere wider, and the path is shorter.
 //!
-//! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply; further short passes
-//! are put in there.
+//! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply;
+//! further short passes are put in there.
 
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
@@ -26,28 +29,31 @@ use keys::{SceneError, toml_number, word_of};
 use scallop::strip_width;
 use work::monitor::Monitor;
 
-/// Nodes of the front's grid lie this share of the cutter's radius apart: features that a cutter fits into are wider.
-/// Coarser grids blur the strip's width, finer ones cost time.
+/// Nodes of the front's grid lie this share of the cutter's radius apart: features that a cutter fits into
+/// are wider. Coarser grids blur the strip's width, finer ones cost time.
 const PITCH_OVER_RADIUS: f64 = 0.2;
 
-/// Where fronts meet, nodes lie this share of the strip on a plane apart: with fewer the corners of neighbouring passes
-/// wander by more than further passes make up for.
+/// Where fronts meet, nodes lie this share of the strip on a plane apart: with fewer the corners of
+/// neighbouring passes wander by more than further passes make up for.
 const PITCH_OVER_STRIP: f64 = 0.4;
 
-/// Bounds of the nodes a side. The error of φ falls with the square of the pitch; the time grows with its inverse square.
+/// Bounds of the nodes a side. The error of φ falls with the square of the pitch; the time grows with its
+/// inverse square.
 const NODES: [usize; 2] = [81, 401];
 
-/// A front has come to rest where its last round of sweeps moved no level by more than this share of an interval: no ridge
-/// shows that.
+/// A front has come to rest where its last round of sweeps moved no level by more than this share of an
+/// interval: no ridge shows that.
 const SETTLED: f64 = 1e-3;
 
-/// Above this share of an interval its differences of second order have not come to rest, and say less than those of first order.
+/// Above this share of an interval its differences of second order have not come to rest, and say less than
+/// those of first order.
 const MOST_UNSETTLED: f64 = 0.1;
 
 /// Places a side at which a path's length is predicted, and a side's length is measured.
 const LENGTH_SAMPLES: usize = 120;
 
-/// How many of the starts with the least predicted length are planned; the prediction leaves out further passes.
+/// How many of the starts with the least predicted length are planned; the prediction leaves out further
+/// passes.
 const PLANNED: usize = 2;
 
 /// Where a front starts whose levels are passes.
@@ -64,12 +70,13 @@ pub enum FrontStart {
     },
     /// All four borders at once: passes run around.
     AllBorders,
-    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the borders.
+    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the
+    /// borders.
     Line([[f64; 2]; 2]),
 }
 
-/// Each pass at exactly the strip's width from the one before, measured on the surface across the feed: level curves of the
-/// arrival of a front that starts on a curve and moves by the strip's width.
+/// Each pass at exactly the strip's width from the one before, measured on the surface across the feed: level
+/// curves of the arrival of a front that starts on a curve and moves by the strip's width.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IsoScallop {
     /// Where the first pass is.
@@ -339,12 +346,12 @@ pub(crate) fn places<'a>(chart: &Chart<'a>, n: usize) -> (Vec<([f64; 2], ChartPo
     (places, (u1 - u0) * (v1 - v0) / (n * n) as f64)
 }
 
-/// Where levels one apart lie farther from each other than the strip by more than this share, which they do along kinks
-/// of a front, further passes will be put in. Less takes the error of coarse grids for kinks.
+/// Where levels one apart lie farther from each other than the strip by more than this share, which they do
+/// along kinks of a front, further passes will be put in. Less takes the error of coarse grids for kinks.
 const KINK: f64 = 0.05;
 
-/// Length, mm, of the cutter's way along level curves one apart: `∫ |∇φ| (1 − κ r) dA`, κ the curvature along them; twice
-/// that along kinks.
+/// Length, mm, of the cutter's way along level curves one apart: `∫ |∇φ| (1 − κ r) dA`, κ the curvature along
+/// them; twice that along kinks.
 pub(crate) fn predicted_length(
     (places, cell): &(Vec<([f64; 2], ChartPoint)>, f64),
     cutter: &Cutter,
@@ -384,8 +391,9 @@ mod tests {
         Part::from_patches(vec![Patch::Nurbs(surface)], 0.005).unwrap()
     }
 
-    /// Passes around it lie `√(8 h r)` apart, as on a plane: with h = 0.05 a ball of radius 5 takes 10/1.414 = 7.07 of
-    /// them, and whole passes are eight half circles (so are those of any ball from 3.91 to 5.10).
+    /// Passes around it lie `√(8 h r)` apart, as on a plane: with h = 0.05 a ball of radius 5 takes
+    /// 10/1.414 = 7.07 of them, and whole passes are eight half circles (so are those of any ball from 3.91
+    /// to 5.10).
     #[test]
     fn passes_around_a_half_cylinder_are_eight_half_circles_long() {
         let (part, cutter) = (half_cylinder(), Cutter::ball(10.0).unwrap());
@@ -420,7 +428,8 @@ mod tests {
         let total: f64 = curves.map(|curve| length(&curve.points)).sum();
         println!("{total:.3} mm");
         assert!((total / (8.0 * 5.0 * PI) - 1.0).abs() < 0.01, "{total}");
-        // Not rounded to whole passes, and of the ball's centre, which runs along circles of twice the radius.
+        // Not rounded to whole passes, and of the ball's centre, which runs along circles of twice the
+        // radius.
         let exact = predicted_length(&places(chart, LENGTH_SAMPLES), &cutter, settings.step, &field);
         assert!((exact / (2.0 * 50.0 * PI / interval) - 1.0).abs() < 0.01, "{exact}");
     }
@@ -443,7 +452,8 @@ mod tests {
         Part::from_patches(vec![Patch::Nurbs(surface)], 0.005).unwrap()
     }
 
-    /// Levels one apart run to and fro there where fronts break into corners: by the speeds as they are, sweeps never settle.
+    /// Levels one apart run to and fro there where fronts break into corners: by the speeds as they are,
+    /// sweeps never settle.
     #[test]
     fn passes_of_a_leaning_bull_nose_over_a_hollow_do_not_run_to_and_fro() {
         let (part, cutter) = (saddle(), Cutter::bull(6.0, 2.0).unwrap());
@@ -481,8 +491,9 @@ mod tests {
         assert!(after < 0.5 * before, "{after} of {before} rad");
     }
 
-    /// Across the slope a flat leaves strips a tenth as wide as along it, and slopes change from place to place: differences of second
-    /// order carry φ away even by convex speeds. No level is farther than the narrowest strips on the way to it.
+    /// Across the slope a flat leaves strips a tenth as wide as along it, and slopes change from place to
+    /// place: differences of second order carry φ away even by convex speeds. No level is farther than the
+    /// narrowest strips on the way to it.
     #[test]
     fn fronts_of_a_flat_over_steep_ground_stay_within_what_their_strips_allow() {
         const HEIGHTS: [[f64; 6]; 6] = [

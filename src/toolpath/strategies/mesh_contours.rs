@@ -1,11 +1,12 @@
 //! Waterline passes on a mesh: contours of the dropped cutter's height, however steep the walls are.
 //!
-//! Enters: a part that is a mesh, and how heights step. Leaves: passes on which the tip keeps its height. Where the part is
-//! flatter than whole passes serve, further ones follow contours halfway between (`levels::halving`).
+//! Enters: a part that is a mesh, and how heights step. Leaves: passes on which the tip keeps its height.
+//! Where the part is flatter than whole passes serve, further ones follow contours halfway between
+//! (`levels::halving`).
 //!
-//! Where a wall ends at an edge the cutter rolls over it. From there a pass serves about half an interval of the wall, so
-//! that it is left out where the cutter has rolled farther. On walls that are upright and on ground that is nearly level no
-//! contour is of use.
+//! Where a wall ends at an edge the cutter rolls over it. From there a pass serves about half an interval of
+//! the wall, so that it is left out where the cutter has rolled farther. On walls that are upright and on
+//! ground that is nearly level no contour is of use.
 
 #[cfg(test)]
 mod tests;
@@ -26,11 +27,12 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Least vertical part of the normal of a wall that faces up; less is upright, or rounding of the file.
 pub(super) const LEAST_FACING: f64 = 1e-4;
 
-/// Faces that contours serve. Those of a wall lie as close on it as it is steep, and halving an interval six times comes to a
-/// 64th of it: the sine of the least slope.
+/// Faces that contours serve. Those of a wall lie as close on it as it is steep, and halving an interval six
+/// times comes to a 64th of it: the sine of the least slope.
 const SERVED: Faces = Faces { least: LEAST_FACING, most: 0.999_878 };
 
-/// Where the cutter would come to rest lower than a contour's level by more than this, mm, its side touches, not its end.
+/// Where the cutter would come to rest lower than a contour's level by more than this, mm, its side touches,
+/// not its end.
 const JUMP: f64 = 1e-3;
 
 /// Angles between faces and cutter below this, rad, are rounding.
@@ -39,14 +41,16 @@ const ROUNDING: f64 = 1e-6;
 /// A place counts as reached by the cutter unless that comes to rest higher by this, mm.
 const HELD_OFF: f64 = 1e-3;
 
-/// How far, in intervals, the cutter may have rolled over the upper edge of a wall for a pass to be of use. The pass beside it is
-/// then so near to the edge that hardly more stands over that than what passes leave on the face beyond.
+/// How far, in intervals, the cutter may have rolled over the upper edge of a wall for a pass to be of use.
+/// The pass beside it is then so near to the edge that hardly more stands over that than what passes leave on
+/// the face beyond.
 const ROLLED_OVER: f64 = 0.8;
 
 /// The same of the lower edge: a pass serves half an interval.
 const ROLLED_UNDER: f64 = 0.5;
 
-/// The step of heights is never less than this share of what a plane allows, however much the surface hugs the cutter.
+/// The step of heights is never less than this share of what a plane allows, however much the surface hugs
+/// the cutter.
 const LEAST_FREE: f64 = 0.05;
 
 /// Places along a side of a triangle that are asked for what they allow, at most.
@@ -211,8 +215,8 @@ impl ContourGuide<'_> {
             let at = SurfacePoint { point, normal, at: None, triangle: t as u32 };
             if let Some((Allowed { step, width }, too_concave)) = self.allowed_at(&at) {
                 let [lowest, highest] = [(tip.z - half).max(low), (tip.z + half).min(high)];
-                // The outer levels are half an interval inside of the ends of the range. What of an end lies below its contact may
-                // reach less far down: a flat's nothing at all.
+                // The outer levels are half an interval inside of the ends of the range. What of an end lies
+                // below its contact may reach less far down: a flat's nothing at all.
                 let by_scallop = matches!(self.settings.step, Step::Scallop(_));
                 let over = if by_scallop { (ROLLED_OVER - 0.5) * step } else { 0.0 };
                 let reach = self.dropped.corner_radius() * normal.xy().norm().min(1.0).asin();
@@ -229,8 +233,8 @@ impl ContourGuide<'_> {
         reached
     }
 
-    /// What the cutter touches with its axis at a place of a contour; the range of slopes (angle from the vertical) that it has
-    /// there; and how far its side begins below what it touches, mm.
+    /// What the cutter touches with its axis at a place of a contour; the range of slopes (angle from the
+    /// vertical) that it has there; and how far its side begins below what it touches, mm.
     fn contact(&self, axis: &Point2, level: f64) -> (SurfacePoint, [f64; 2], f64) {
         let rests = self.contours.drop().at(axis.x, axis.y).filter(|rests| rests.tip_z > level - JUMP);
         let Some(rests) = rests else {
@@ -308,7 +312,8 @@ impl ContourGuide<'_> {
     }
 }
 
-/// Calls with the weights of the second and the third corner at the middles of `parts`² equal parts of a triangle.
+/// Calls with the weights of the second and the third corner at the middles of `parts`² equal parts of a
+/// triangle.
 fn for_each_part(parts: usize, mut call: impl FnMut([f64; 2])) {
     for i in 0..parts {
         for j in 0..parts - i {

@@ -43,11 +43,13 @@ const BORDER_SHARE: f64 = 0.6;
 /// share twice over where two neighbours move apart.
 const MOST_MOVED: f64 = 0.02;
 
-/// Where the axis is farther from its place over the level than this many times that, the cutter rolls over an edge.
+/// Where the axis is farther from its place over the level than this many times that, the cutter rolls over
+/// an edge.
 const ROLLING: f64 = 3.0;
 
-/// Contacts from one point of a curve to before the next, where passes are compared with directions: at borders, and where the surface is
-/// nearly as concave as the cutter, contacts turn far more sharply than the axis.
+/// Contacts from one point of a curve to before the next, where passes are compared with directions: at
+/// borders, and where the surface is nearly as concave as the cutter, contacts turn far more sharply than the
+/// axis.
 const PARTS_COMPARED: usize = 4;
 
 /// A length over which the normal is differentiated, mm.
@@ -170,7 +172,8 @@ fn on_piece(
     Ok(all)
 }
 
-/// A function whose levels run along the borders of a piece with a hole, around which they close; `None` without a hole.
+/// A function whose levels run along the borders of a piece with a hole, around which they close; `None`
+/// without a hole.
 fn along_borders(task: &Task<'_>, piece: &ConnectedPiece, surface: &MeshSurface) -> Option<Vec<f64>> {
     if piece.mesh.loops().len() < 2 {
         return None;
@@ -268,14 +271,15 @@ fn bends_across(n: &Vector3, b: &Vector3, bend: &Bend) -> FeedCurvature {
     FeedCurvature::of(&b.cross(n), b, |d| bend.along(d))
 }
 
-/// The distance of passes on level ground that a mesh is made ready for, mm: a flat end may take more where that goes on.
+/// The distance of passes on level ground that a mesh is made ready for, mm: a flat end may take more where
+/// that goes on.
 pub(crate) fn level_interval(cutter: &Cutter, h: f64) -> f64 {
     let strip = strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0;
     strip.min(strip_width(0.0, 0.0, h, cutter.radius()).0)
 }
 
-/// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of
-/// samples).
+/// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the
+/// weight of samples).
 fn feed_lines(
     task: &Task<'_>,
     direction: &FeedDirection,
@@ -380,7 +384,8 @@ impl MeshGuide<'_> {
         Point3::from((0..3).map(|k| corners[k].coords * p.weights[k]).sum::<Vector3>())
     }
 
-    /// The contact of a cutter whose axis is at a place, moving `toward` another, near that of the level between two points of its curve.
+    /// The contact of a cutter whose axis is at a place, moving `toward` another, near that of the level
+    /// between two points of its curve.
     fn touch(&self, from: &Spot, to: &Spot, t: f64, axis: Point2, toward: Vector2) -> Option<Contact> {
         let triangle = from.at.triangle;
         let level = from.at.position + (to.at.position - from.at.position) * t;

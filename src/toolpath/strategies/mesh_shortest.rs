@@ -1,7 +1,7 @@
 //! The stream function with the best path on a mesh: as `shortest`, by linear elements.
 //!
-//! The gradient of linear elements jumps from triangle to triangle, so ψ is judged by recovered gradients. A little stiffness
-//! keeps it from kinks.
+//! The gradient of linear elements jumps from triangle to triangle, so ψ is judged by recovered gradients. A
+//! little stiffness keeps it from kinks.
 
 use std::f64::consts::PI;
 
@@ -20,23 +20,25 @@ use work::parallel;
 /// Straight passes to start from, over half a turn.
 const STARTS: usize = 6;
 
-/// Functions that are gone on with, and planned, for the least time: what they promise is not what their levels give.
+/// Functions that are gone on with, and planned, for the least time: what they promise is not what their
+/// levels give.
 const MOST_PLANNED: usize = 3;
 
-/// Intervals are judged by the gradients at vertices, as passes see them; those of triangles count by this share, for the
-/// unevenness that vertices do not see.
+/// Intervals are judged by the gradients at vertices, as passes see them; those of triangles count by this
+/// share, for the unevenness that vertices do not see.
 const DAMPING: f64 = 0.2;
 
-/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Less leaves bends, which linear
-/// elements do not mind; on three patches a tenth of it makes passes 1 % shorter that turn by a third more.
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Less leaves bends,
+/// which linear elements do not mind; on three patches a tenth of it makes passes 1 % shorter that turn by a
+/// third more.
 const BEND: f64 = 0.3;
 
 /// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
 const STRIP_SHARE: f64 = 0.02;
 
-/// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least time, the most promising
-/// first. `toward` has at each vertex a direction and how much dearer passes square to it are; `further` is a start besides straight
-/// passes.
+/// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least
+/// time, the most promising first. `toward` has at each vertex a direction and how much dearer passes square
+/// to it are; `further` is a start besides straight passes.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -138,8 +140,8 @@ fn roughness(surface: &MeshSurface, cutter: &Cutter, density: f64) -> Roughness 
                 let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
                 terms.extend(hats.map(|(v, gradient)| (v, gradient.dot(&outward))));
             }
-            // A jump over the edge's share of both triangles, whose thirds are about as wide as the edge's distance from
-            // their middles.
+            // A jump over the edge's share of both triangles, whose thirds are about as wide as the edge's
+            // distance from their middles.
             let area = (mesh.area(t) + mesh.area(n)) / 3.0;
             let weight = BEND * cutter.radius().powi(2) / density * edge.norm_squared() / area;
             roughness.push(weight, terms);

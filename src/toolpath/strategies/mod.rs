@@ -1,7 +1,8 @@
-//! The strategies, one file each: its parameters, its keys in a scene, its planner. Enters: part, cutter and pass settings.
-//! Leaves: passes, not yet joined.
+//! The strategies, one file each: its parameters, its keys in a scene, its planner. Enters: part, cutter and
+//! pass settings. Leaves: passes, not yet joined.
 //!
-//! A new strategy is a new file and a line in [`STRATEGIES`]; its words, keys, defaults and help come from there.
+//! A new strategy is a new file and a line in [`STRATEGIES`]; its words, keys, defaults and help come from
+//! there.
 
 mod contour_spiral;
 pub(crate) mod direction_keys;
@@ -57,7 +58,8 @@ pub struct StrategyRead {
     pub tables: Vec<Located<String>>,
 }
 
-/// Reads the strategy of a toolpath's table; `cutter_radius` is the scene's, mm. Refuses keys that the strategy does not take.
+/// Reads the strategy of a toolpath's table; `cutter_radius` is the scene's, mm. Refuses keys that the
+/// strategy does not take.
 ///
 /// # Errors
 /// [`SceneError`] at the first word, key or value that is wrong.

@@ -1,19 +1,22 @@
-//! Passes of a ball whose centre runs over the offset surface of the part's mesh: where the part has concave creases, no
-//! offset of its patches does, and the ball touches both sides at once.
+//! Passes of a ball whose centre runs over the offset surface of the part's mesh: where the part has concave
+//! creases, no offset of its patches does, and the ball touches both sides at once.
 //!
-//! Enters: the part, a ball and a direction of the plan view. Leaves: tips of an upright ball, or touches of a tilted one.
+//! Enters: the part, a ball and a direction of the plan view. Leaves: tips of an upright ball, or touches of
+//! a tilted one.
 //!
-//! The centre runs on the level set {distance = r} (`geometry::mesh_offset`). Passes are level curves of a stream function on
-//! its mesh: their plan view keeps to the direction where the surface leaves that choice, and they are one interval apart on
-//! the offset surface everywhere, steep walls included. Every place of a pass is put onto the level set itself (of patches:
-//! of the exact surface), so that the mesh decides where passes run, not how deep.
+//! The centre runs on the level set {distance = r} (`geometry::mesh_offset`). Passes are level curves of a
+//! stream function on its mesh: their plan view keeps to the direction where the surface leaves that choice,
+//! and they are one interval apart on the offset surface everywhere, steep walls included. Every place of a
+//! pass is put onto the level set itself (of patches: of the exact surface), so that the mesh decides where
+//! passes run, not how deep.
 //!
-//! The interval is one of centres. Two balls with centres e apart leave a ridge `r − √(r² − e²/4)` below the line of
-//! centres; where the offset surface has the curvature κ₀ across the feed (positive concave) that line lies `κ₀ e²/8` above
-//! it, so that h = e²/8 (1/r + κ₀) to second order. With κ₀ = κ/(1 − κ r) and e = w (1 − κ r) this is the strip's
-//! `w²/8 (1/r − κ)`. Here it is not approximated: the point in which two neighbouring balls meet is asked for its distance from
-//! the part, which also tells of facets and shallow creases. A crease steeper than [`PENCIL`] has a pass of its own along its
-//! valley; neighbours do not look beyond it.
+//! The interval is one of centres. Two balls with centres e apart leave a ridge `r − √(r² − e²/4)` below the
+//! line of centres; where the offset surface has the curvature κ₀ across the feed (positive concave) that
+//! line lies `κ₀ e²/8` above it, so that h = e²/8 (1/r + κ₀) to second order. With κ₀ = κ/(1 − κ r) and e = w
+//! (1 − κ r) this is the strip's `w²/8 (1/r − κ)`. Here it is not approximated: the point in which two
+//! neighbouring balls meet is asked for its distance from the part, which also tells of facets and shallow
+//! creases. A crease steeper than [`PENCIL`] has a pass of its own along its valley; neighbours do not look
+//! beyond it.
 //!
 //! Limits: an upright ball cannot come to what lies below an overhang; it is left out and its area told.
 
@@ -41,8 +44,8 @@ use offset::{LevelSet, MeshOffset, OffsetError, OffsetSettings, Valley};
 use part::Part;
 use work::monitor::Monitor;
 
-/// Cells of the offset's lattice over the ball's radius. Passes are put onto the level set afterwards; smaller cells see
-/// narrower channels.
+/// Cells of the offset's lattice over the ball's radius. Passes are put onto the level set afterwards;
+/// smaller cells see narrower channels.
 const CELL_OVER_RADIUS: f64 = 0.1;
 
 /// Cells are tried as often, each time less by this factor, until they make a surface.
@@ -52,7 +55,8 @@ const LESS_CELL: f64 = 0.83;
 /// Passes serve the strip inside of a border from this share of an interval beyond it, too.
 const BORDER_SHARE: f64 = 0.6;
 
-/// Valleys whose sides differ by more than this, rad, are cut by a pass along them. Facets of smooth hollows differ by less.
+/// Valleys whose sides differ by more than this, rad, are cut by a pass along them. Facets of smooth hollows
+/// differ by less.
 const PENCIL: f64 = 0.3;
 
 /// The interval is never less than this share of that on a plane, nor greater than this multiple of it.
@@ -62,8 +66,8 @@ const WIDEST_OVER_PLANE: f64 = 2.5;
 /// Corrections of an interval; each squares the share by which its scallop is off.
 const CORRECTIONS: usize = 4;
 
-/// A centre that is this much lower than an upright ball comes, mm, cannot be reached, and by which it is moved away from
-/// walls before it is asked.
+/// A centre that is this much lower than an upright ball comes, mm, cannot be reached, and by which it is
+/// moved away from walls before it is asked.
 const BELOW: f64 = 1e-3;
 const ASIDE: f64 = 1e-6;
 
@@ -211,7 +215,8 @@ impl MeshRider<'_> {
     fn is_reached(&self, centre: &Point3) -> bool {
         let Some(drop) = &self.drop else { return true };
         let tip = centre.z - self.level.distance();
-        // A ball that touches a wall is let drop a little beside it; on which side the walls are is not asked.
+        // A ball that touches a wall is let drop a little beside it; on which side the walls are is not
+        // asked.
         (0..8).any(|k| {
             let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4).sin_cos();
             let found = drop.at(centre.x + ASIDE * cos, centre.y + ASIDE * sin);
@@ -263,7 +268,8 @@ impl MeshRider<'_> {
         e
     }
 
-    /// Height above the part of the ridge between balls with these centres, mm; `None` where they do not meet.
+    /// Height above the part of the ridge between balls with these centres, mm; `None` where they do not
+    /// meet.
     fn ridge(&self, a: &Point3, b: &Point3, away: &Vector3) -> Option<f64> {
         let (between, radius) = (b - a, self.level.distance());
         let along = between.try_normalize(1e-12)?;

@@ -1,13 +1,16 @@
-//! Passes of a ball whose centre rides on an offset surface: along its parameter lines, or as one spiral around it.
+//! Passes of a ball whose centre rides on an offset surface: along its parameter lines, or as one spiral
+//! around it.
 //!
-//! Enters: the part's patches and the radius, or offset surfaces that were made before (from sections that were
-//! offset each in its plane). Leaves: passes with the ball's centre exactly on the surface at their points. On the exact
-//! offset of a patch the centre stands the radius off the contact, so its lines are those of the patch; an offset
-//! surface of another origin is ridden on as it is, and what it is off the true distance is cut off the part, or left.
+//! Enters: the part's patches and the radius, or offset surfaces that were made before (from sections that
+//! were offset each in its plane). Leaves: passes with the ball's centre exactly on the surface at their
+//! points. On the exact offset of a patch the centre stands the radius off the contact, so its lines are
+//! those of the patch; an offset surface of another origin is ridden on as it is, and what it is off the true
+//! distance is cut off the part, or left.
 //!
-//! Between two lines the centres may lie `e = w (1 − κ r)` apart, `w` the strip and `κ` the design's curvature across
-//! the feed; on the offset surface itself that curvature is `κ/(1 − κ r)` (FORMULAS of parallel surfaces, e.g. do Carmo
-//! 1976, §3.5 exercise 11), which is how a surface of another origin is planned on.
+//! Between two lines the centres may lie `e = w (1 − κ r)` apart, `w` the strip and `κ` the design's
+//! curvature across the feed; on the offset surface itself that curvature is `κ/(1 − κ r)` (FORMULAS of
+//! parallel surfaces, e.g. do Carmo 1976, §3.5 exercise 11), which is how a surface of another origin is
+//! planned on.
 
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
@@ -36,8 +39,8 @@ const SAMPLES: usize = 160;
 /// Places along a parameter line by which its length is measured.
 const LENGTH_SAMPLES: usize = 64;
 
-/// Lines run on beyond open borders by this share of the interval, on the surface's tangent planes: where they do not meet
-/// the border squarely, one side of the strip would end before it.
+/// Lines run on beyond open borders by this share of the interval, on the surface's tangent planes: where
+/// they do not meet the border squarely, one side of the strip would end before it.
 const OVERRUN: f64 = 0.3;
 
 /// Ends of a line nearer than this, mm, are one place of a closed one.
@@ -61,10 +64,12 @@ pub enum OffsetAlong {
 pub enum OffsetDrive {
     /// The part's own, everywhere the radius off along the normal.
     Exact,
-    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
-    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
+    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these
+    /// planes; whoever has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps
+    /// clear leaves such places out.
     InPlane,
-    /// The same as published: offsets that cross themselves are not trimmed. Put in its place as for [`OffsetDrive::InPlane`].
+    /// The same as published: offsets that cross themselves are not trimmed. Put in its place as for
+    /// [`OffsetDrive::InPlane`].
     Published,
     /// These surfaces, `du × dv` away from the part.
     Given(Arc<Vec<NurbsSurface>>),
@@ -271,8 +276,8 @@ impl PatchRider<'_> {
         ))
     }
 
-    /// The distance that centres may have across the feed on an offset surface of another origin, mm, and whether the
-    /// part is too concave there.
+    /// The distance that centres may have across the feed on an offset surface of another origin, mm, and
+    /// whether the part is too concave there.
     fn width_between_centres(&self, p: &ChartPoint, feed: &Vector3) -> (f64, bool) {
         let radius = self.cutter.radius();
         let FeedCurvature { along, across, twist } = p.bends(feed);
@@ -320,7 +325,8 @@ impl PatchRider<'_> {
         Ok((place_levels(&places, range, placing, &mut notes), notes))
     }
 
-    /// One spiral: a turn along the first level, then from level to level with every turn, then a turn along the last.
+    /// One spiral: a turn along the first level, then from level to level with every turn, then a turn along
+    /// the last.
     fn spiral(&self) -> Result<Passes, PlanError> {
         let [[u0, u1], [v0, v1]] = self.ranges();
         if ![v0, 0.5 * (v0 + v1), v1].into_iter().all(|v| self.is_closed_at(v)) {

@@ -1,5 +1,5 @@
-//! A program from elsewhere: G-code or cutter locations of another system. It plans nothing; its path is read from a file and
-//! cut and measured like any other.
+//! A program from elsewhere: G-code or cutter locations of another system. It plans nothing; its path is read
+//! from a file and cut and measured like any other.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
@@ -49,16 +49,19 @@ pub struct ForeignProgram {
 pub struct ReadProgram {
     /// The moves of the tool, or of all.
     pub path: Toolpath,
-    /// The joints of a machine with rotary axes, and the pace, that the program goes through, for each stretch of a tool, with its number. None of
-    /// cutter locations, and on other machines.
+    /// The joints of a machine with rotary axes, and the pace, that the program goes through, for each
+    /// stretch of a tool, with its number. None of cutter locations, and on other machines.
     pub joints: Vec<(u32, Vec<Waypoint>)>,
-    /// Where the rotary axes of a table stand in the joints' zero, rad, first and second axis; a head's stand at zero.
+    /// Where the rotary axes of a table stand in the joints' zero, rad, first and second axis; a head's stand
+    /// at zero.
     pub table_zero: [f64; 2],
     /// Under which setting of the control rapid moves run straight, in a clause; `None` where they always do.
     pub straight_rapids: Option<&'static str>,
-    /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
+    /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all
+    /// moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
-    /// Lengths of tools from the spindle nose to the tip by their numbers, mm, as far as the table of tools has them.
+    /// Lengths of tools from the spindle nose to the tip by their numbers, mm, as far as the table of tools
+    /// has them.
     pub gauge_lengths: BTreeMap<u32, f64>,
     /// What other tools of the program cut before, where the table of tools has their cutters.
     pub before: Vec<(Cutter, Toolpath)>,

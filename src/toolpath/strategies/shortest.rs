@@ -1,18 +1,21 @@
 //! Streamlines along the feed directions that make the whole path quickest, or shortest.
 //!
-//! A pass costs `1 − κ_f r` mm of the cutter's way for each mm along the surface (κ_f its curvature along the feed, r the
-//! cutter's corner radius) and serves a strip of width w(direction). No path that holds the scallop and cuts no
-//! deeper than the part is shorter than the integral of the least `(1 − κ_f r)/w` over all directions: [`shortest_possible`]. (Chords cut
-//! deeper by shares of their tolerance, and what is cut around the ends of passes is left out: about half a square strip at each.) Directions that reach it
-//! everywhere seldom belong to passes that also lie one strip apart. The stream function that costs least in all
-//! ([`super::stream_search`]) settles between both.
+//! A pass costs `1 − κ_f r` mm of the cutter's way for each mm along the surface (κ_f its curvature along the
+//! feed, r the cutter's corner radius) and serves a strip of width w(direction). No path that holds the
+//! scallop and cuts no deeper than the part is shorter than the integral of the least `(1 − κ_f r)/w` over
+//! all directions: [`shortest_possible`]. (Chords cut deeper by shares of their tolerance, and what is cut
+//! around the ends of passes is left out: about half a square strip at each.) Directions that reach it
+//! everywhere seldom belong to passes that also lie one strip apart. The stream function that costs least in
+//! all ([`super::stream_search`]) settles between both.
 //!
-//! A machine takes time for links from pass to pass and in bends that it cannot run at the feed. By machining time, both have the price
-//! that they have on the machine, in mm of pass at the feed, and of the few best functions that one is taken whose passes, joined, take the
-//! least time. By length, both have a small price of their own, and the shortest passes are taken.
+//! A machine takes time for links from pass to pass and in bends that it cannot run at the feed. By machining
+//! time, both have the price that they have on the machine, in mm of pass at the feed, and of the few best
+//! functions that one is taken whose passes, joined, take the least time. By length, both have a small price
+//! of their own, and the shortest passes are taken.
 //!
-//! The fronts of iso-scallop passes are among the starts. Where their own passes are still better than those of all functions found, they are
-//! taken, and named so. Closed passes one inside the other are joined to spirals where that is quicker than links ([`spirals`]).
+//! The fronts of iso-scallop passes are among the starts. Where their own passes are still better than those
+//! of all functions found, they are taken, and named so. Closed passes one inside the other are joined to
+//! spirals where that is quicker than links ([`spirals`]).
 //!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm.
 
@@ -43,23 +46,26 @@ use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
-/// By length alone: what a rad counts for that passes turn by since the surface is bent along them, in radii of the cutter.
+/// By length alone: what a rad counts for that passes turn by since the surface is bent along them, in radii
+/// of the cutter.
 const TURN: f64 = 0.78;
 
-/// By length alone: what an end of a pass counts, in radii of the cutter: half of the link to the next pass and its turn.
+/// By length alone: what an end of a pass counts, in radii of the cutter: half of the link to the next pass
+/// and its turn.
 const END: f64 = 0.28;
 
-/// Places a side, and directions over half a turn, of the shortest possible length. With twice as many it changes by
-/// less than 0.1 % on the shipped parts.
+/// Places a side, and directions over half a turn, of the shortest possible length. With twice as many it
+/// changes by less than 0.1 % on the shipped parts.
 const PLACES: usize = 150;
 const DIRECTIONS: usize = 36;
 
-/// Plans within this share of the best one are compared once more by their own chords: longer ones change what they take by about as
-/// much.
+/// Plans within this share of the best one are compared once more by their own chords: longer ones change
+/// what they take by about as much.
 const AS_GOOD: f64 = 5e-4;
 
-/// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place: of patches and of
-/// smooth surfaces that are fitted to meshes, as far as the part lies below, or of the facets of meshes with holes and steps.
+/// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at
+/// each place: of patches and of smooth surfaces that are fitted to meshes, as far as the part lies below, or
+/// of the facets of meshes with holes and steps.
 ///
 /// # Errors
 /// When no smooth surface can be fitted to a mesh, and when cancelled.
@@ -122,7 +128,8 @@ struct Least {
 }
 
 impl Least {
-    /// By how much longer than the contact's the cutter's way is along a unit tangent, and by the strip's width there.
+    /// By how much longer than the contact's the cutter's way is along a unit tangent, and by the strip's
+    /// width there.
     fn of(
         area: f64,
         tangent: &Vector3,
@@ -176,11 +183,12 @@ impl Objective {
     }
 }
 
-/// Streamlines of the feed directions with the quickest or shortest path: each one strip from the next, their first curve searched.
+/// Streamlines of the feed directions with the quickest or shortest path: each one strip from the next, their
+/// first curve searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShortestStreamline {
-    /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great number
-    /// none.
+    /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom,
+    /// a great number none.
     pub toward: Option<(FeedDirection, f64)>,
     /// What the best path has the least of; with a direction, closeness to it comes first.
     pub objective: Objective,
@@ -330,8 +338,8 @@ fn searched(
     }
 }
 
-/// Which of some functions have the best passes, by chords so many times `longer` than asked for, the best one first, and all that
-/// are nearly as good.
+/// Which of some functions have the best passes, by chords so many times `longer` than asked for, the best
+/// one first, and all that are nearly as good.
 fn compared(
     task: &Task<'_>,
     chart: &Chart,

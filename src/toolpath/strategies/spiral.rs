@@ -1,7 +1,7 @@
 //! One spiral in the plan view, from the middle of the part outward, the cutter dropped on the part along it.
 //!
-//! A turn's pitch is the stepover of the tightest place that it passes, so the spiral is Archimedean where all turns allow
-//! the same. Where it leaves the part it is cut into pieces.
+//! A turn's pitch is the stepover of the tightest place that it passes, so the spiral is Archimedean where
+//! all turns allow the same. Where it leaves the part it is cut into pieces.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::{self, Write as _};
@@ -21,7 +21,8 @@ use work::monitor;
 /// Places a side of each chart at which the pitch is computed.
 const SAMPLES: usize = 160;
 
-/// Rings of the plan view with a pitch of their own. More follow the surface closer; fewer places then speak for each.
+/// Rings of the plan view with a pitch of their own. More follow the surface closer; fewer places then speak
+/// for each.
 const RINGS: usize = 64;
 
 /// Within this many stepovers of the middle a turn passes a place in every direction.
@@ -30,7 +31,8 @@ const MIDDLE: f64 = 4.0;
 /// Directions tried there.
 const MIDDLE_DIRECTIONS: usize = 8;
 
-/// The spiral is laid out in steps of this share of a sampling distance, between which angle and radius grow evenly.
+/// The spiral is laid out in steps of this share of a sampling distance, between which angle and radius grow
+/// evenly.
 const LAYOUT_SHARE: f64 = 0.5;
 
 /// A step turns by this much at most, rad.
@@ -39,11 +41,11 @@ const MOST_TURN: f64 = 0.1;
 /// One spiral.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spiral {
-    /// From the middle of the plan view outward, its pitch that of the tightest place of each turn. Where it leaves the part
-    /// it is cut into pieces.
+    /// From the middle of the plan view outward, its pitch that of the tightest place of each turn. Where it
+    /// leaves the part it is cut into pieces.
     Plan,
-    /// From the border to the middle between the passes of an iso-scallop path from all borders, without a retract; further
-    /// short passes where its turns have corners. For parts whose front closes in one point.
+    /// From the border to the middle between the passes of an iso-scallop path from all borders, without a
+    /// retract; further short passes where its turns have corners. For parts whose front closes in one point.
     Contour,
 }
 

@@ -1,12 +1,14 @@
 //! The search for the stream function of one chart whose passes cost least.
 //!
-//! A B-spline is minimised from straight passes in several directions on a coarse net, and from fronts of the four borders, because
-//! each start leads to a minimum of its own ([`field::minimise_priced`]).
+//! A B-spline is minimised from straight passes in several directions on a coarse net, and from fronts of the
+//! four borders, because each start leads to a minimum of its own ([`field::minimise_priced`]).
 //!
-//! A function that goes on from a front is the front itself, whose levels are the first iterate, and what a spline puts to it. It stays
-//! constant along the border that the front started at: its first pass runs along that whole border, half an interval inside. Passes that meet a border at a small angle run on beyond it until their strips are cut, which costs
-//! half a mm for each mm of the border, so that no function near by is as good. Where the front reaches the border across all along at
-//! the same number of passes, that border is kept to as well.
+//! A function that goes on from a front is the front itself, whose levels are the first iterate, and what a
+//! spline puts to it. It stays constant along the border that the front started at: its first pass runs along
+//! that whole border, half an interval inside. Passes that meet a border at a small angle run on beyond it
+//! until their strips are cut, which costs half a mm for each mm of the border, so that no function near by
+//! is as good. Where the front reaches the border across all along at the same number of passes, that border
+//! is kept to as well.
 //!
 //! The remainder of the last pass is drawn in to a whole number of passes by a higher price of ends.
 //!
@@ -27,8 +29,8 @@ use geometry::KnotVector;
 use work::monitor::{Cancelled, Monitor};
 use work::parallel;
 
-/// Spans of the spline's knots are this many of the cutter's radii long. Features that a cutter fits into are wider; finer
-/// nets gain a few tenths of a per cent.
+/// Spans of the spline's knots are this many of the cutter's radii long. Features that a cutter fits into are
+/// wider; finer nets gain a few tenths of a per cent.
 const SPAN_OVER_RADIUS: f64 = 0.6;
 
 /// Fewest and most spans a side. Time grows with their product.
@@ -45,28 +47,28 @@ const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 const DEGREE: usize = 3;
 
-/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Without it passes on a twisted patch
-/// turn by half as much again, and are longer, since there are more minima to end in.
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Without it passes on a
+/// twisted patch turn by half as much again, and are longer, since there are more minima to end in.
 const BEND: f64 = 0.25;
 
 /// Directions over half a turn by which the curvature along them is told.
 const CURVED: usize = 12;
 
-/// A number of passes is drawn in to a whole one by a greater price of ends, first by this factor, so often corrected; it
-/// shall end within this share of a pass below, or a little above, which levels allow for.
+/// A number of passes is drawn in to a whole one by a greater price of ends, first by this factor, so often
+/// corrected; it shall end within this share of a pass below, or a little above, which levels allow for.
 const DEARER: f64 = 1.25;
 const PRICES: usize = 4;
 const WHOLE: [f64; 2] = [0.3, 0.1];
 
-/// A front that reaches the border across within this many passes is turned to reach it at once, which costs half of that much of
-/// the length; passes that end there cost half a pass.
+/// A front that reaches the border across within this many passes is turned to reach it at once, which costs
+/// half of that much of the length; passes that end there cost half a pass.
 const REACHED: f64 = 1.0;
 
 /// Fronts that are gone on from: those with the shortest passes.
 const FRONTS: usize = 2;
 
-/// Functions that promise no more than this share above the best one are planned, since what they promise is not what their
-/// levels give. Front and level curves of one function differ by less.
+/// Functions that promise no more than this share above the best one are planned, since what they promise is
+/// not what their levels give. Front and level curves of one function differ by less.
 const NEARLY_AS_GOOD: f64 = 0.01;
 
 /// Two minima are the same one where cost and number of passes differ by less than these shares.
@@ -81,7 +83,8 @@ pub(super) struct Prices<'a> {
     pub turning: &'a (dyn Fn(f64) -> f64 + Sync),
 }
 
-/// Sorts what was found, the most promising first; keeps one of those that are the same minimum, and what is nearly as good as the best.
+/// Sorts what was found, the most promising first; keeps one of those that are the same minimum, and what is
+/// nearly as good as the best.
 pub(super) fn keep_promising<T>(
     found: &mut Vec<T>,
     end: f64,
@@ -99,7 +102,8 @@ pub(super) fn keep_promising<T>(
     found.retain(|of| priced(of) <= most);
 }
 
-/// What turning costs by the direction across the passes, as `[m, c, s]` of a [`Site`]; `curvature` is that along them.
+/// What turning costs by the direction across the passes, as `[m, c, s]` of a [`Site`]; `curvature` is that
+/// along them.
 pub(super) fn turning(prices: &Prices<'_>, curvature: impl Fn(f64) -> f64) -> [f64; 3] {
     let mut turning = [0.0; 3];
     for k in 0..CURVED {
@@ -129,8 +133,8 @@ pub(super) struct Found {
     pub function: ScalarField,
     /// The length that it promises, mm.
     pub length: f64,
-    /// The border that its passes run along from end to end: which parameter is constant there (0: u, 1: v), and whether it is
-    /// the least (0) or the greatest (1).
+    /// The border that its passes run along from end to end: which parameter is constant there (0: u, 1: v),
+    /// and whether it is the least (0) or the greatest (1).
     pub along: Option<Border>,
 }
 
@@ -148,7 +152,8 @@ struct Net {
     places: Vec<[f64; 2]>,
     gradients: Gradients,
     roughness: Roughness,
-    /// The front to which functions are put, and the ties of their control points; `None` for functions by themselves.
+    /// The front to which functions are put, and the ties of their control points; `None` for functions by
+    /// themselves.
     put_to: Option<(GridField, Tied)>,
 }
 
@@ -233,8 +238,8 @@ impl Search<'_> {
         minimise_priced(&net.sites, &net.gradients, &net.roughness, end, start, rounds, self.monitor)
     }
 
-    /// A function like the one found, of a whole number of passes: what is left over would be another pass. `None` where
-    /// nothing is, or where it does not give way.
+    /// A function like the one found, of a whole number of passes: what is left over would be another pass.
+    /// `None` where nothing is, or where it does not give way.
     fn drawn_in(&self, net: &Net, found: &Packed, end: f64) -> Result<Option<Packed>, Cancelled> {
         let whole = found.passes.floor();
         let [below, above] = WHOLE;
@@ -332,7 +337,8 @@ impl Search<'_> {
         Some(Net { knots, sites: kept, borders, places, gradients, roughness, put_to: None })
     }
 
-    /// What passes may do and cost at a place that stands for an area in parameters, or for a step along a border.
+    /// What passes may do and cost at a place that stands for an area in parameters, or for a step along a
+    /// border.
     fn site(&self, u: f64, v: f64, area: f64, along: [f64; 2]) -> Option<Site> {
         let front = front_at(self.chart, self.cutter, self.step, u, v)?;
         let p = self.chart.at(u, v)?;
@@ -375,8 +381,9 @@ impl Search<'_> {
     }
 }
 
-/// What the second derivatives along two tangents square to each other take of a function's first and second derivatives by
-/// the parameters, less those of the surface itself: a share of the sum of their squares, and the factors.
+/// What the second derivatives along two tangents square to each other take of a function's first and second
+/// derivatives by the parameters, less those of the surface itself: a share of the sum of their squares, and
+/// the factors.
 fn hessian(p: &ChartPoint) -> Option<[(f64, [Vec<f64>; 2]); 3]> {
     let e1 = p.jet.du.try_normalize(1e-300)?;
     let (a, b) = (p.jet.pull_back(&e1)?, p.jet.pull_back(&p.normal.cross(&e1))?);
@@ -416,8 +423,8 @@ impl Net {
             .map(move |k| if parameter == 0 { k * nu + at } else { at * nu + k })
     }
 
-    /// The functions beside a front, with itself: constant along the border of its start, and along the one across where it reaches that
-    /// nearly at once. Passes have no ends there.
+    /// The functions beside a front, with itself: constant along the border of its start, and along the one
+    /// across where it reaches that nearly at once. Passes have no ends there.
     fn beside(&self, front: &StartedFront) -> Option<(Self, Vec<f64>)> {
         let border = front.border?;
         let across = (border.0, 1 - border.1);
@@ -528,7 +535,8 @@ mod tests {
         assert!(drawn.short < 0.01);
     }
 
-    /// What goes on from a front has the front's passes to begin with, runs along its whole border, and is no longer than the front.
+    /// What goes on from a front has the front's passes to begin with, runs along its whole border, and is no
+    /// longer than the front.
     #[test]
     fn a_function_beside_a_front_keeps_its_border_and_is_no_longer() {
         let (surface, cutter) = (saddle(0.03), Cutter::ball(18.0).unwrap());
@@ -574,8 +582,9 @@ mod tests {
         }
     }
 
-    /// Circles about the middle of a part are no front of a border, and straight passes are a minimum of their own, 23 degrees
-    /// off and more: the function fitted to the circles is where the search has to start.
+    /// Circles about the middle of a part are no front of a border, and straight passes are a minimum of
+    /// their own, 23 degrees off and more: the function fitted to the circles is where the search has to
+    /// start.
     #[test]
     fn circles_are_kept_to_where_leaving_them_is_dear() {
         let (surface, cutter) = (saddle(0.03), Cutter::ball(6.0).unwrap());

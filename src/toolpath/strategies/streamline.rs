@@ -43,11 +43,12 @@ pub enum StreamMethod {
     Differences,
     /// Finite elements on the part's mesh: all patches as one surface, holes and steps as they are.
     Elements,
-    /// As published for vectors of a table: a tensor-product cubic B-spline whose gradient, turned by a right angle, is nearest to
-    /// the vectors at their own places, lengths included, on averaged knots and of minimum norm.
+    /// As published for vectors of a table: a tensor-product cubic B-spline whose gradient, turned by a right
+    /// angle, is nearest to the vectors at their own places, lengths included, on averaged knots and of
+    /// minimum norm.
     Published,
-    /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic B-spline on
-    /// uniform knots.
+    /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic
+    /// B-spline on uniform knots.
     Automatic,
 }
 
@@ -68,8 +69,8 @@ pub struct Streamline {
     pub lines: Lines,
 }
 
-/// Default control points a side of a stream function. More follow finer changes of the feed direction and cost time as
-/// their cube; fewer smooth them away.
+/// Default control points a side of a stream function. More follow finer changes of the feed direction and
+/// cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
 
 /// Default degree of a stream function: smooth to the curvature of passes.
@@ -336,7 +337,8 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
 const ALIKE: &str = "no direction has a wider strip than another here, so that passes follow the stream function of least \
                      machining time";
 
-/// Whether strips are as wide in all directions, as on planes and spheres: what then is the widest is rounding.
+/// Whether strips are as wide in all directions, as on planes and spheres: what then is the widest is
+/// rounding.
 fn all_strips_are_alike(chart: &Chart, cutter: &Cutter) -> bool {
     let matters =
         |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&FeedDirection::WidestStrip, cutter).map(|(_, m)| m);
@@ -428,8 +430,8 @@ fn stream_function(
 /// Degree of the published fit.
 const PUBLISHED_DEGREE: usize = 3;
 
-/// The function whose gradient, turned by a right angle, is nearest to the vectors of a table in the parameters of a chart:
-/// all count alike, at their own places and with their lengths.
+/// The function whose gradient, turned by a right angle, is nearest to the vectors of a table in the
+/// parameters of a chart: all count alike, at their own places and with their lengths.
 fn published(direction: &FeedDirection, chart: &Chart, controls: usize) -> Result<StreamFit, PlanError> {
     let given: Vec<LineSample> = match direction {
         FeedDirection::File { samples: Some(table), .. } if is_by_parameters(table, chart) => {
@@ -460,7 +462,8 @@ fn published(direction: &FeedDirection, chart: &Chart, controls: usize) -> Resul
         .map_err(|e| not_applicable(&e.to_string()))
 }
 
-/// Whether the places of a table are parameters of a chart: those of the plan view are where u and v are x and y.
+/// Whether the places of a table are parameters of a chart: those of the plan view are where u and v are x
+/// and y.
 fn is_by_parameters(table: &LineField, chart: &Chart) -> bool {
     let is_plan = |[u, v]: [f64; 2]| {
         let p = chart.jet(u, v).p;
@@ -519,7 +522,8 @@ mod tests {
     use std::sync::Arc;
     use work::monitor::Silent;
 
-    /// The velocities of ψ = sin(u/6) cos(v/5) + u v/60 at 15 × 15 places of a plane of 15 by 12 mm, as a file of directions.
+    /// The velocities of ψ = sin(u/6) cos(v/5) + u v/60 at 15 × 15 places of a plane of 15 by 12 mm, as a
+    /// file of directions.
     fn vectors() -> FeedDirection {
         let sample = |k: usize| {
             let at @ [u, v] = [15.0 * (k % 15) as f64 / 14.0, 12.0 * (k / 15) as f64 / 14.0];
@@ -564,7 +568,8 @@ mod tests {
         [(squares / angles.len() as f64).sqrt(), angles.into_iter().fold(0.0, f64::max)]
     }
 
-    /// On a sphere no strip is wider than another: directions of the widest would be rounding, and passes along them times as long.
+    /// On a sphere no strip is wider than another: directions of the widest would be rounding, and passes
+    /// along them times as long.
     #[test]
     fn on_a_sphere_passes_of_the_widest_strip_are_the_quickest() {
         let shape = AnalyticShape::Sphere { height: 0.0, radius: 20.0, concave: false };
@@ -629,8 +634,8 @@ mod tests {
         Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
     }
 
-    /// The bound of a ring is that of its own area, and not of the rectangle around it; so is that of a plate without a hole whose border
-    /// is no rectangle.
+    /// The bound of a ring is that of its own area, and not of the rectangle around it; so is that of a plate
+    /// without a hole whose border is no rectangle.
     #[test]
     fn the_shortest_possible_path_is_that_of_the_part() {
         let (cutter, h) = (Cutter::ball(6.0).unwrap(), 0.02);
@@ -667,8 +672,9 @@ mod tests {
         assert!(length > least && length < 1.1 * least, "{length} {least}");
     }
 
-    /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the
-    /// distances of passes; where the scallop sets them, by the more the greater their weight.
+    /// Vectors that have a stream function are followed as closely as the published fit does where their
+    /// lengths set the distances of passes; where the scallop sets them, by the more the greater their
+    /// weight.
     #[test]
     fn vectors_of_a_stream_function_are_followed() {
         let [rms, most] = off(StreamMethod::Published, Solver::MinimumNorm, 7, DIRECTION_WEIGHT);

@@ -1,9 +1,9 @@
 //! Waterline passes: curves on which the cutter keeps its height.
 //!
-//! The height of the tip while the cutter touches the chart is a scalar function of the parameters; its level curves are
-//! the contours of the part's offset surface. Heights are placed either a constant step apart or by the slope; where the
-//! part is flatter than the steps serve, further passes follow contours halfway between. The cutter is dropped on the part
-//! along each, so that other places of the part hold it off.
+//! The height of the tip while the cutter touches the chart is a scalar function of the parameters; its level
+//! curves are the contours of the part's offset surface. Heights are placed either a constant step apart or
+//! by the slope; where the part is flatter than the steps serve, further passes follow contours halfway
+//! between. The cutter is dropped on the part along each, so that other places of the part hold it off.
 //!
 //! Limits: level ground has no contours; how much of the part is too level for the passes is said in a note.
 
@@ -32,12 +32,12 @@ const LEAST_WALLS: f64 = 1e-3;
 /// Places a side at which the slope is compared with the passes.
 const SLOPE_SAMPLES: usize = 120;
 
-/// Contours closer together than this share of what the mean slope asks for are not reached by halving: the place counts
-/// as level.
+/// Contours closer together than this share of what the mean slope asks for are not reached by halving: the
+/// place counts as level.
 const LEVEL_SHARE: f64 = 1.0 / 64.0;
 
-/// Curves of constant height of the cutter. Where the part is nearly level they lie far apart: further passes fill in as far
-/// as six halvings reach.
+/// Curves of constant height of the cutter. Where the part is nearly level they lie far apart: further passes
+/// fill in as far as six halvings reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waterline {
     /// How the height steps from pass to pass.
@@ -119,7 +119,8 @@ fn has_walls(mesh: &TriangleMesh) -> bool {
     steep.map(area).sum::<f64>() > LEAST_WALLS * all.map(area).sum::<f64>()
 }
 
-/// Share of the chart's area on which the step of height that a strip allows is less than [`LEVEL_SHARE`] of the mean one.
+/// Share of the chart's area on which the step of height that a strip allows is less than [`LEVEL_SHARE`] of
+/// the mean one.
 fn level_share(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassSettings) -> f64 {
     let place = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;

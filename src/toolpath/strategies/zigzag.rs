@@ -1,12 +1,12 @@
 //! Zigzag: passes in parallel vertical planes, the cutter dropped on the part along each.
 //!
-//! One stepover serves the whole part, so it is that of the worst place. Passes a plan-view
-//! distance Δ apart lie `Δ/√(1 − (n·e)²)` apart on the surface of the cutter's centres, `e` the
-//! plan direction across the feed; that surface is the part's offset, where lengths across the
-//! feed are `1 − κ r` times those on the part.
+//! One stepover serves the whole part, so it is that of the worst place. Passes a plan-view distance Δ apart
+//! lie `Δ/√(1 − (n·e)²)` apart on the surface of the cutter's centres, `e` the plan direction across the
+//! feed; that surface is the part's offset, where lengths across the feed are `1 − κ r` times those on the
+//! part.
 //!
-//! Of meshes with creases the facets tell the stepover: a smooth surface over a crease bends as no face of the part does. What is
-//! left at creases is measured, and corrected there.
+//! Of meshes with creases the facets tell the stepover: a smooth surface over a crease bends as no face of
+//! the part does. What is left at creases is measured, and corrected there.
 
 use std::fmt::{self, Write as _};
 
@@ -33,7 +33,8 @@ const LEAST_OVER_PLANE: f64 = 0.1;
 /// Places a side of each chart at which the stepover is computed.
 const STEPOVER_SAMPLES: usize = 160;
 
-/// Angles over half a turn whose length is predicted. Between two of them a length changes by a few per cent at most.
+/// Angles over half a turn whose length is predicted. Between two of them a length changes by a few per cent
+/// at most.
 const ANGLES: usize = 36;
 
 /// Cells a side on which the plan coordinate of a patch is sampled.
@@ -56,7 +57,8 @@ pub struct Zigzag {
 pub enum ZigzagAngle {
     /// This far from the x axis, rad.
     Given(f64),
-    /// The one with the shortest path: searched over half a turn by the predicted length, the best few planned.
+    /// The one with the shortest path: searched over half a turn by the predicted length, the best few
+    /// planned.
     Best,
 }
 
@@ -153,7 +155,8 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
 }
 
-/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on each patch.
+/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on
+/// each patch.
 fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let across = Vector2::new(-angle.sin(), angle.cos());
@@ -166,8 +169,8 @@ fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     Ok(all)
 }
 
-/// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length
-/// (surface along the feed over the stepover), and the best are planned.
+/// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the
+/// predicted length (surface along the feed over the stepover), and the best are planned.
 fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
@@ -191,7 +194,8 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
             }
         };
         let covered = places.iter().filter_map(|(p, area)| {
-            // The way of the corner's centre over one place: its length along the feed, and its width in the plan view.
+            // The way of the corner's centre over one place: its length along the feed, and its width in the
+            // plan view.
             let t = p.tangent_at(angle(k))?;
             let e = Vector2::new(-angle(k).sin(), angle(k).cos());
             let b = p.normal.cross(&t);
@@ -239,9 +243,9 @@ pub(crate) fn least_over_plane(cutter: &Cutter, h: f64) -> f64 {
     LEAST_OVER_PLANE * (8.0 * h * cutter.radius()).sqrt()
 }
 
-/// The plan-view stepover, mm, that a place allows for passes in the direction `angle`; `None` where none is asked for,
-/// since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for ever closer ones. Of both
-/// cutters the first one cuts, the second one is dropped.
+/// The plan-view stepover, mm, that a place allows for passes in the direction `angle`; `None` where none is
+/// asked for, since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for
+/// ever closer ones. Of both cutters the first one cuts, the second one is dropped.
 pub(crate) fn stepover_at(
     p: &ChartPoint,
     [cutter, dropped]: [&Cutter; 2],
@@ -253,7 +257,8 @@ pub(crate) fn stepover_at(
     in_plan(strip, p.curvature_along(&p.normal.cross(&t)), &p.normal, dropped, angle)
 }
 
-/// The plan-view stepover of a strip's width, limited or not, on a surface that bends by `curvature` across the feed.
+/// The plan-view stepover of a strip's width, limited or not, on a surface that bends by `curvature` across
+/// the feed.
 fn in_plan(
     (width, too_concave): (f64, bool),
     curvature: f64,
@@ -274,7 +279,8 @@ fn in_plan(
 enum Ground<'a> {
     /// Places of charts.
     Charts(Vec<(ChartPoint<'a>, f64)>),
-    /// Facets by their normals, and how the surface bends there. Widths are corrected by the least factor anywhere: one stepover serves all.
+    /// Facets by their normals, and how the surface bends there. Widths are corrected by the least factor
+    /// anywhere: one stepover serves all.
     Facets { all: Vec<(Vector3, Bend)>, factor: f64 },
 }
 

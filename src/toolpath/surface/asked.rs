@@ -1,8 +1,8 @@
 //! Where feed directions are asked for, to compare passes with.
 //!
-//! Most directions have a formula at every place. A table asks at its rows, guide curves and borders ask along themselves, and nothing
-//! is asked between and beyond: what the field has there is ours. So these leave [`Row`]s. A blend is a mean at every place, and its
-//! parts are spread for that.
+//! Most directions have a formula at every place. A table asks at its rows, guide curves and borders ask
+//! along themselves, and nothing is asked between and beyond: what the field has there is ours. So these
+//! leave [`Row`]s. A blend is a mean at every place, and its parts are spread for that.
 
 use std::f64::consts::PI;
 
@@ -44,7 +44,8 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// The unit tangent that is asked for, on a surface of unit `normal`; `None` where the line stands square to it.
+    /// The unit tangent that is asked for, on a surface of unit `normal`; `None` where the line stands square
+    /// to it.
     pub fn asked(&self, normal: &Vector3) -> Option<Vector3> {
         let tangent = if self.is_plan {
             Vector3::new(-self.line.y, self.line.x, 0.0).cross(normal)
@@ -66,7 +67,8 @@ pub(crate) fn is_everywhere(direction: &FeedDirection) -> bool {
     )
 }
 
-/// Where a direction matters less, there is none: level ground, strips as wide in all directions, lines that cancel.
+/// Where a direction matters less, there is none: level ground, strips as wide in all directions, lines that
+/// cancel.
 fn least_matter(direction: &FeedDirection) -> f64 {
     match direction {
         FeedDirection::Steepest | FeedDirection::Contour => LEAST_SLOPE.sin(),
@@ -75,7 +77,8 @@ fn least_matter(direction: &FeedDirection) -> f64 {
     }
 }
 
-/// The tangent of a direction that is asked for everywhere, given what the fit wants at a place and how much that matters.
+/// The tangent of a direction that is asked for everywhere, given what the fit wants at a place and how much
+/// that matters.
 pub(crate) fn everywhere(direction: &FeedDirection, wanted: &Wanted) -> Option<Vector3> {
     let (tangent, matters) = (*wanted)?;
     (is_everywhere(direction) && matters >= least_matter(direction)).then_some(tangent)
@@ -97,7 +100,8 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// The rows of a direction, those side by side on a curve together; none of one that is asked for everywhere.
+    /// The rows of a direction, those side by side on a curve together; none of one that is asked for
+    /// everywhere.
     pub fn rows(&self, direction: &FeedDirection) -> Vec<Vec<Row>> {
         match direction {
             FeedDirection::Samples(table) | FeedDirection::File { samples: Some(table), .. } => {

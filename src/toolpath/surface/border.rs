@@ -1,8 +1,7 @@
-//! Where the part ends: a cutter that touches its border rolls over an edge instead of cutting a
-//! surface.
+//! Where the part ends: a cutter that touches its border rolls over an edge instead of cutting a surface.
 //!
-//! A zigzag pass ends where the cutter has rolled over the border by more than one stepover. Passes that end at the border itself
-//! leave slivers where they meet it at a small angle.
+//! A zigzag pass ends where the cutter has rolled over the border by more than one stepover. Passes that end
+//! at the border itself leave slivers where they meet it at a small angle.
 
 use std::collections::HashMap;
 
@@ -79,8 +78,8 @@ impl<'a> Border<'a> {
         self.part.highest_at(p.x, p.y).is_some()
     }
 
-    /// By how much the contact would lie elsewhere had the surface gone on beside the edge; nothing for a disc with a
-    /// sharp rim, which touches level ground anywhere.
+    /// By how much the contact would lie elsewhere had the surface gone on beside the edge; nothing for a
+    /// disc with a sharp rim, which touches level ground anywhere.
     pub fn roll(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> Vector3 {
         if cutter.corner_radius() == 0.0 {
             let pointed = cutter.profile().point().sin > 0.0;

@@ -1,11 +1,11 @@
 //! The part as planners see it: smooth surfaces over parameter rectangles.
 //!
-//! Patches are planned on as they are. A mesh has no curvature, so a bicubic B-spline height
-//! surface z(x, y) is fitted to it; directions and distances of passes come from that surface,
-//! while heights of cutter locations always come from dropping the cutter on the mesh itself.
+//! Patches are planned on as they are. A mesh has no curvature, so a bicubic B-spline height surface z(x, y)
+//! is fitted to it; directions and distances of passes come from that surface, while heights of cutter
+//! locations always come from dropping the cutter on the mesh itself.
 //!
-//! A chart carries the rule for the tool axis and the correction of widths, so that every strip is that of the cutter as it
-//! leans and of what was measured.
+//! A chart carries the rule for the tool axis and the correction of widths, so that every strip is that of
+//! the cutter as it leans and of what was measured.
 
 use super::mesh_surface;
 use crate::vocabulary::{Along, FeedDirection, Guide, PlanError, Step};
@@ -17,15 +17,15 @@ use motion::{CcPoint, in_tool_frame};
 use part::Part;
 use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at, widest_strip_at};
 
-/// Control points of a height surface lie so many facets apart, and no less and no more than these shares of the cutter's
-/// radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so that meshes that have any take
-/// the greatest; coarser misses curvature that the cutter feels: where bumps are as wide as the cutter, half a radius misses
-/// a tenth of it, and intervals are a few per cent too wide.
+/// Control points of a height surface lie so many facets apart, and no less and no more than these shares of
+/// the cutter's radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so
+/// that meshes that have any take the greatest; coarser misses curvature that the cutter feels: where bumps
+/// are as wide as the cutter, half a radius misses a tenth of it, and intervals are a few per cent too wide.
 const FACETS_A_CONTROL: f64 = 5.0;
 const CONTROL_PITCH_OVER_RADIUS: [f64; 2] = [0.25, 0.5];
 
-/// A coarse height surface whose normals are off those of the facets by more than this, rad (root mean square), is fitted again
-/// with the closest control points. Facets of a smooth shape are off it by less.
+/// A coarse height surface whose normals are off those of the facets by more than this, rad (root mean
+/// square), is fitted again with the closest control points. Facets of a smooth shape are off it by less.
 const MOST_OFF_FACETS: f64 = 0.04;
 
 /// Places a side at which that is measured.
@@ -44,17 +44,18 @@ const SMOOTHNESS: f64 = 1e-6;
 /// Rounds in which an interval and the curvature over it are made to agree.
 const INTERVAL_ROUNDS: usize = 2;
 
-/// Where the slope turns, the axis of a cutter with a flat gets ahead of its contact by no more than so many times the way of that
-/// over a crest, and falls behind by no more than this share of it in a hollow.
+/// Where the slope turns, the axis of a cutter with a flat gets ahead of its contact by no more than so many
+/// times the way of that over a crest, and falls behind by no more than this share of it in a hollow.
 const MOST_AHEAD: f64 = 2.0;
 const MOST_BEHIND: f64 = 0.5;
 
-/// An interval is no less than this share of what its middle allows: at sharper edges further passes are put in.
+/// An interval is no less than this share of what its middle allows: at sharper edges further passes are put
+/// in.
 const LEAST_INTERVAL: f64 = 0.25;
 
-/// Height, mm, of the ridge between contacts `width` apart, where the cutter is `gap(s)` more curved than the surface, 1/mm,
-/// s from the middle. From either contact the cutter rises over the surface by the integral of the way left times that;
-/// the ridge stands where both have risen equally.
+/// Height, mm, of the ridge between contacts `width` apart, where the cutter is `gap(s)` more curved than the
+/// surface, 1/mm, s from the middle. From either contact the cutter rises over the surface by the integral of
+/// the way left times that; the ridge stands where both have risen equally.
 fn ridge_between(width: f64, gap: impl Fn(f64) -> f64) -> f64 {
     // Gauss's three places over each half.
     let (far, weights) = (0.6_f64.sqrt(), [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0]);
@@ -118,8 +119,8 @@ impl ChartPoint<'_> {
         self.sign * along.unwrap_or(0.0)
     }
 
-    /// How much longer the way of the cutter's corner centre is than that of the contact, along the unit tangent `t`; 0
-    /// where the corner does not fit.
+    /// How much longer the way of the cutter's corner centre is than that of the contact, along the unit
+    /// tangent `t`; 0 where the corner does not fit.
     pub fn offset_ratio(&self, cutter: &Cutter, t: &Vector3) -> f64 {
         (1.0 - self.curvature_along(t) * cutter.corner_radius()).max(0.0)
     }
@@ -134,8 +135,8 @@ impl ChartPoint<'_> {
         Vector3::new(-line[1], line[0], 0.0).cross(&self.normal).try_normalize(1e-12)
     }
 
-    /// The feed as a unit tangent in space, and how much it matters here (0 to 1, or to the weight of samples); `None`
-    /// where there is none, also for directions that curves give (see [`super::feed`]).
+    /// The feed as a unit tangent in space, and how much it matters here (0 to 1, or to the weight of
+    /// samples); `None` where there is none, also for directions that curves give (see [`super::feed`]).
     pub fn feed(&self, direction: &FeedDirection, cutter: &Cutter) -> Option<(Vector3, f64)> {
         let unit = |t: &Vector3| t.try_normalize(1e-12);
         match direction {
@@ -177,9 +178,10 @@ impl ChartPoint<'_> {
         FeedCurvature::of(t, &self.normal.cross(t), |d| self.curvature_along(d))
     }
 
-    /// The tangent across the feed `t` along which the cutter cuts: it stands least above the surface there, of all places of
-    /// the pass. On a plane a ball cuts at right angles to the feed; a torus fed askew to its slope does not,
-    /// nor does any cutter on a surface that twists along the feed. Its part across the feed has length one.
+    /// The tangent across the feed `t` along which the cutter cuts: it stands least above the surface there,
+    /// of all places of the pass. On a plane a ball cuts at right angles to the feed; a torus fed askew to
+    /// its slope does not, nor does any cutter on a surface that twists along the feed. Its part across the
+    /// feed has length one.
     pub fn cut_across(&self, cutter: &Cutter, t: &Vector3) -> Vector3 {
         let [n, b] = self.across_in_tool_frame(cutter, t);
         self.normal.cross(t) + t * cut_ahead(cutter, &n, &b, &self.bends(t))
@@ -268,7 +270,8 @@ impl<'a> Chart<'a> {
         if follows { Ok(coarse) } else { fitted(least) }
     }
 
-    /// How far the normals of a fitted surface are off those of the facets, rad (root mean square over the plan view).
+    /// How far the normals of a fitted surface are off those of the facets, rad (root mean square over the
+    /// plan view).
     fn off_facets(&self, part: &Part) -> f64 {
         let off = |[u, v]: [f64; 2]| {
             let (here, facet) = (self.at(u, v)?, part.highest_at(u, v)?);
@@ -278,8 +281,8 @@ impl<'a> Chart<'a> {
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
-    /// [`ChartPoint::strip_width`] for passes on both sides of a place, with the curvature of all that lies between them: at
-    /// an edge, or where a blend begins, it is another one half an interval away.
+    /// [`ChartPoint::strip_width`] for passes on both sides of a place, with the curvature of all that lies
+    /// between them: at an edge, or where a blend begins, it is another one half an interval away.
     pub fn interval(&self, p: &ChartPoint, cutter: &Cutter, t: &Vector3, step: Step) -> (f64, bool) {
         let (at_place, limited) = p.strip_width(cutter, t, step);
         let across = p.cut_across(cutter, t);
@@ -308,9 +311,9 @@ impl<'a> Chart<'a> {
         (width, limited)
     }
 
-    /// Where the axis of an upright cutter stands, in the plan view, that touches a place. Its flat reaches over nearly level ground
-    /// as far as it does on a plane, but where the slope turns so fast that the axis would swerve or turn back; `chord` mm are no
-    /// matter.
+    /// Where the axis of an upright cutter stands, in the plan view, that touches a place. Its flat reaches
+    /// over nearly level ground as far as it does on a plane, but where the slope turns so fast that the axis
+    /// would swerve or turn back; `chord` mm are no matter.
     pub fn axis_over(&self, p: &ChartPoint, cutter: &Cutter, chord: f64) -> Vector2 {
         let bends = || {
             let k = p.jet.principal_curvatures()?;
@@ -435,7 +438,8 @@ impl<'a> Chart<'a> {
     }
 }
 
-/// [`Cutter::axis_offset`] on a surface with these principal curvatures, 1/mm, positive concave; `chord` mm are no matter.
+/// [`Cutter::axis_offset`] on a surface with these principal curvatures, 1/mm, positive concave; `chord` mm
+/// are no matter.
 pub fn axis_offset_over(
     n: &Vector3,
     bends: impl FnOnce() -> Option<[f64; 2]>,
@@ -501,8 +505,8 @@ mod tests {
     use approx::assert_relative_eq;
     use geometry::TriangleMesh;
 
-    /// On both sides of a step of curvature, from 0.2 to 1 more than the surface's, contacts 2 apart: the ridge stands a third
-    /// beside the middle and 2/9 high.
+    /// On both sides of a step of curvature, from 0.2 to 1 more than the surface's, contacts 2 apart: the
+    /// ridge stands a third beside the middle and 2/9 high.
     #[test]
     fn ridges_over_a_step_of_curvature_stand_where_both_sides_meet() {
         let step = |s: f64| if s < 0.0 { 0.2 } else { 1.0 };
@@ -528,8 +532,8 @@ mod tests {
         NurbsSurface::new(2, 1, knots, vec![0.0, 0.0, 1.0, 1.0], &net, Some(&weights)).unwrap()
     }
 
-    /// Far from an edge the interval is what the place allows; beside the edge, on level ground, it is less, so that the ridge
-    /// between contacts on the plane and on the arc is as high as asked.
+    /// Far from an edge the interval is what the place allows; beside the edge, on level ground, it is less,
+    /// so that the ridge between contacts on the plane and on the arc is as high as asked.
     #[test]
     fn intervals_are_narrower_where_an_edge_begins_within_them() {
         let surface = rounded_edge();
@@ -554,8 +558,8 @@ mod tests {
         assert!(width < 0.8 * plane && ridge < 1.15 * h && ridge > 0.8 * h, "{width} of {plane}: {ridge}");
     }
 
-    /// A torus and a ball on a surface that slopes and twists, fed in all directions: over places at one distance across the
-    /// feed the cutter stands least above the one that is told.
+    /// A torus and a ball on a surface that slopes and twists, fed in all directions: over places at one
+    /// distance across the feed the cutter stands least above the one that is told.
     #[test]
     fn the_cutter_cuts_where_it_stands_least_above_the_surface() {
         let corner = |x: f64, y: f64| Point3::new(x, y, 0.35 * x + 0.1 * y + 0.03 * x * y);
@@ -586,8 +590,8 @@ mod tests {
         }
     }
 
-    /// On a bump hardly wider than the cutter the fitted surface has the curvature of what the facets are chords of, within
-    /// a share of the cutter's own that makes intervals wider by less than half that share.
+    /// On a bump hardly wider than the cutter the fitted surface has the curvature of what the facets are
+    /// chords of, within a share of the cutter's own that makes intervals wider by less than half that share.
     #[test]
     fn a_surface_fitted_to_fine_facets_is_curved_as_what_they_are_chords_of() {
         const CELLS: usize = 60;

@@ -1,11 +1,12 @@
-//! Feed directions that a single place cannot tell: those that curves give, on charts and on meshes; and refusals of
-//! directions that a part has nowhere.
+//! Feed directions that a single place cannot tell: those that curves give, on charts and on meshes; and
+//! refusals of directions that a part has nowhere.
 //!
 //! Curves say something beside them only. Elsewhere the field is the smoothest line field that they allow
 //! ([`smooth_lines`]), on a mesh of the part or of the chart.
 //!
-//! At a corner of the border its bisector says in which sense the field turns. Along the mitre inside the corner the
-//! bisector of what both sides want says it. Without them both senses are equally good, and the orientation breaks.
+//! At a corner of the border its bisector says in which sense the field turns. Along the mitre inside the
+//! corner the bisector of what both sides want says it. Without them both senses are equally good, and the
+//! orientation breaks.
 //!
 //! A blend is the mean of doubled angles, because a direction and its opposite are the same pass.
 
@@ -27,26 +28,28 @@ use part::Part;
 /// away from what was asked for, less lets the noise of fitted curvature turn them.
 pub(crate) const SMOOTHING_OVER_RADIUS: f64 = 0.5;
 
-/// A guide curve speaks for what lies within this share of the cutter's radius of it, and for the nearest vertices.
+/// A guide curve speaks for what lies within this share of the cutter's radius of it, and for the nearest
+/// vertices.
 const REACH_OVER_RADIUS: f64 = 0.5;
 
 /// Nodes a side of the mesh on which curves spread their directions over a chart.
 const NODES: usize = 97;
 
-/// Inside a corner of the border lines pass through nothing, where less than this is left of them: nothing tells in which
-/// sense they turn. Below it the bisector of what the border wants on both sides does.
+/// Inside a corner of the border lines pass through nothing, where less than this is left of them: nothing
+/// tells in which sense they turn. Below it the bisector of what the border wants on both sides does.
 const MITRE: f64 = 0.35;
 
-/// How fast a place of the border loses its say with distance, as the exponent of the distance; and the share of all says
-/// that must be left of their sum for it to count.
+/// How fast a place of the border loses its say with distance, as the exponent of the distance; and the share
+/// of all says that must be left of their sum for it to count.
 const SAY: i32 = 4;
 const LEAST_SAY: f64 = 0.3;
 
-/// Sampled directions that cover less than this share of a part leave most of it to what they are at their border.
+/// Sampled directions that cover less than this share of a part leave most of it to what they are at their
+/// border.
 const LEAST_COVERED: f64 = 0.5;
 
-/// Refuses directions that are given only outside of a part with bounds `b`, and leaves notes on those that cover little of it.
-/// `domains` are the parameters of its patches.
+/// Refuses directions that are given only outside of a part with bounds `b`, and leaves notes on those that
+/// cover little of it. `domains` are the parameters of its patches.
 pub(crate) fn check(
     direction: &FeedDirection,
     b: &Aabb,
@@ -372,8 +375,8 @@ mod tests {
     use geometry::{AnalyticShape, AnalyticSurface, Vector2};
     use part::Patch;
 
-    /// Short stretches of guides at 0.2 rad on one side of a plate and at 0.9 rad on the other: between them exp(2iθ) is
-    /// harmonic and depends on x only, so it is a straight line between its values.
+    /// Short stretches of guides at 0.2 rad on one side of a plate and at 0.9 rad on the other: between them
+    /// exp(2iθ) is harmonic and depends on x only, so it is a straight line between its values.
     #[test]
     fn between_guides_the_field_is_harmonic() {
         let surface = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 30.0], [0.0, 20.0]]);
@@ -393,8 +396,8 @@ mod tests {
             panic!("curves become samples")
         };
         for (x, y) in (3..28).flat_map(|x| [(f64::from(x), 3.0), (f64::from(x), 16.5)]) {
-            // The guides hold what is within their reach by (z − w) = ℓ² z'', which for the field between them is as if
-            // they held it ℓ coth(reach/ℓ) beyond that reach; both are 1.5 mm.
+            // The guides hold what is within their reach by (z − w) = ℓ² z'', which for the field between
+            // them is as if they held it ℓ coth(reach/ℓ) beyond that reach; both are 1.5 mm.
             let beyond = 1.5 / 1f64.tanh() - 1.5;
             let share = (x + beyond) / (30.0 + 2.0 * beyond);
             let part = |angle: f64| [(2.0 * angle).cos(), (2.0 * angle).sin()];

@@ -1,12 +1,14 @@
-//! Contours of the height at which a dropped cutter comes to rest: where it touches the part at one height of its tip.
+//! Contours of the height at which a dropped cutter comes to rest: where it touches the part at one height of
+//! its tip.
 //!
-//! Enters: a part and a cutter that can be dropped on it. Leaves: closed curves of the plan view, the part's side to their
-//! left, on which the cutter comes no lower than a level, and places on them.
+//! Enters: a part and a cutter that can be dropped on it. Leaves: closed curves of the plan view, the part's
+//! side to their left, on which the cutter comes no lower than a level, and places on them.
 //!
-//! A lattice tells where the cutter at the level would cut into the part; along its lines the border of that is searched
-//! for. So walls are followed that are narrower in the plan view than its cells, however steep.
+//! A lattice tells where the cutter at the level would cut into the part; along its lines the border of that
+//! is searched for. So walls are followed that are narrower in the plan view than its cells, however steep.
 //!
-//! Limits: what lies between two neighbouring lines of the lattice, a slot or a rib of the offset surface, is not seen.
+//! Limits: what lies between two neighbouring lines of the lattice, a slot or a rib of the offset surface, is
+//! not seen.
 
 use std::collections::BTreeMap;
 
@@ -89,7 +91,8 @@ impl<'a> HeightContours<'a> {
         self.cell
     }
 
-    /// How far the cutter that has come to rest at a place stands above a level, mm; minus infinity where nothing holds it.
+    /// How far the cutter that has come to rest at a place stands above a level, mm; minus infinity where
+    /// nothing holds it.
     fn above(&self, at: &Point2, level: f64) -> f64 {
         self.drop.at(at.x, at.y).map_or(f64::NEG_INFINITY, |drop| drop.tip_z) - level - ROUNDING
     }
@@ -109,8 +112,8 @@ impl<'a> HeightContours<'a> {
         curves
     }
 
-    /// The crossed edges of the lattice by number: which one follows, and where the edge is crossed. An edge is that of
-    /// node `n` along x (2n) or along y (2n + 1).
+    /// The crossed edges of the lattice by number: which one follows, and where the edge is crossed. An edge
+    /// is that of node `n` along x (2n) or along y (2n + 1).
     fn steps(&self, level: f64) -> BTreeMap<usize, (usize, Point2)> {
         let [nx, ny] = self.grid.counts();
         let holds = |n: usize| self.tips[n] > level + ROUNDING;
@@ -166,8 +169,8 @@ impl<'a> HeightContours<'a> {
         outside
     }
 
-    /// The place of a contour nearest to a place along the unit vector `out`, to which the cutter does not cut in, or against
-    /// it; `None` where there is none within `reach`, mm.
+    /// The place of a contour nearest to a place along the unit vector `out`, to which the cutter does not
+    /// cut in, or against it; `None` where there is none within `reach`, mm.
     pub fn beside(&self, at: Point2, out: &Vector2, reach: f64, level: f64) -> Option<Point2> {
         let cuts = |at: &Point2| self.above(at, level) > 0.0;
         let starts_inside = cuts(&at);

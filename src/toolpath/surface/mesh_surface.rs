@@ -82,7 +82,8 @@ pub(crate) struct ConnectedPiece {
 }
 
 impl ConnectedPiece {
-    /// The unit normal of a triangle and how the surface bends there, the mean of its corners; `None` without an area.
+    /// The unit normal of a triangle and how the surface bends there, the mean of its corners; `None` without
+    /// an area.
     pub fn facet(&self, t: usize) -> Option<(Vector3, Bend)> {
         let normal = self.mesh.area_vector(t).try_normalize(1e-300)?;
         let mut bend = Bend::default();

@@ -1,5 +1,6 @@
-//! The part as strategies see it. Enters: patches or a mesh. Leaves: charts with normals, curvatures and strip widths at every
-//! parameter; pieces of mesh that are reached from above; borders; feed directions; curves of the plan view.
+//! The part as strategies see it. Enters: patches or a mesh. Leaves: charts with normals, curvatures and
+//! strip widths at every parameter; pieces of mesh that are reached from above; borders; feed directions;
+//! curves of the plan view.
 
 pub mod asked;
 pub mod border;

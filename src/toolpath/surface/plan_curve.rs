@@ -1,7 +1,7 @@
 //! Curves of the plan view as passes: the cutter dropped on the part along each.
 //!
-//! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs on which the
-//! cutter touches surface, and rolls over the part's border no farther than is of use.
+//! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs
+//! on which the cutter touches surface, and rolls over the part's border no farther than is of use.
 
 use std::mem;
 
@@ -13,8 +13,8 @@ use drop_cutter::{Drop, DropCutter};
 use geometry::{Point2, Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};
 
-/// How closely the end of a pass is placed, mm. A pointed cutter has dropped by as much of it as its point is steep,
-/// and the pass runs straight to there.
+/// How closely the end of a pass is placed, mm. A pointed cutter has dropped by as much of it as its point is
+/// steep, and the pass runs straight to there.
 const END_PRECISION: f64 = 1e-9;
 
 /// Shorter stretches are left out, mm.
@@ -82,8 +82,8 @@ impl PlanCurves<'_> {
         }
     }
 
-    /// The runs of a curve over `[s0, s1]` (`s` in mm) on which the cutter cuts surface, as moves. Each run is made
-    /// of stretches inside the part and stretches that roll along its border.
+    /// The runs of a curve over `[s0, s1]` (`s` in mm) on which the cutter cuts surface, as moves. Each run
+    /// is made of stretches inside the part and stretches that roll along its border.
     pub fn pieces(&self, curve: Curve<'_>, [s0, s1]: [f64; 2]) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
         let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
@@ -150,8 +150,8 @@ impl PlanCurves<'_> {
         }
     }
 
-    /// Whether the part lies half way from where the cutter touches to where it touches on the pass beside, on either side.
-    /// In a hollow contacts lie farther apart than axes.
+    /// Whether the part lies half way from where the cutter touches to where it touches on the pass beside,
+    /// on either side. In a hollow contacts lie farther apart than axes.
     fn serves(&self, curve: Curve<'_>, s: f64) -> bool {
         let along = (curve(s + LEAST_STRETCH) - curve(s - LEAST_STRETCH)) / (2.0 * LEAST_STRETCH);
         let across = Vector2::new(-along.y, along.x) * self.overrun;
@@ -160,7 +160,8 @@ impl PlanCurves<'_> {
         [across, -across].into_iter().any(|beside| middle(beside).is_some_and(|p| self.border.under(&p)))
     }
 
-    /// Where the cutter with its axis there touches the part, or would, had the surface gone on over its border.
+    /// Where the cutter with its axis there touches the part, or would, had the surface gone on over its
+    /// border.
     fn touched(&self, axis: Vector2) -> Option<Point2> {
         let drop = self.drop.at(axis.x, axis.y)?;
         let contact = drop.contact.point.xy();
@@ -177,7 +178,8 @@ impl PlanCurves<'_> {
     fn moves(&self, curve: Curve<'_>, run: &[(Footing, f64, f64)]) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let (mut pieces, mut points) = (Vec::new(), Vec::<Point3>::new());
         for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
-            // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
+            // Rolling over corners of the border the cutter rises and falls within less than it does on
+            // surface.
             let mut settings = *self.settings;
             if contact == Footing::Rolling {
                 settings.sampling /= ROLLING_FINER as f64;
@@ -195,8 +197,8 @@ impl PlanCurves<'_> {
         Ok(pieces)
     }
 
-    /// The least cosine of the slope by which the cutter touches the border along a roll: a chord cuts the border deeper by as much as it
-    /// is off over that.
+    /// The least cosine of the slope by which the cutter touches the border along a roll: a chord cuts the
+    /// border deeper by as much as it is off over that.
     fn least_upright(&self, curve: Curve<'_>, [a, b]: [f64; 2]) -> f64 {
         let upright = |k: usize| {
             let (axis, drop) = self.drop_at(curve, a + (b - a) * k as f64 / ROLL_STEPS as f64)?;
@@ -236,8 +238,9 @@ mod tests {
     use part::Part;
     use work::monitor::Silent;
 
-    /// A line beside two plates with a slot between them: the ball rolls off the corner of one and comes to the other a sixteenth of a
-    /// millimetre on, less than passes are sampled at. It does not go straight on over the slot, nor does it lose the way behind it.
+    /// A line beside two plates with a slot between them: the ball rolls off the corner of one and comes to
+    /// the other a sixteenth of a millimetre on, less than passes are sampled at. It does not go straight on
+    /// over the slot, nor does it lose the way behind it.
     #[test]
     fn between_two_corners_a_pass_ends_and_another_begins() {
         let (half, radius, beside) = (0.8f64, 3.0f64, 2.9f64);

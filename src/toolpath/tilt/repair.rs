@@ -1,15 +1,15 @@
 //! Passes on which the tool stays clear: tilted, else lifted, else left out.
 //!
-//! Enters: the touches of a pass, what the tool must keep away from, mm, rad. Leaves: the touches, changed no more than it
-//! takes, in one pass or in several where a stretch cannot be reached, and what was changed. Moves between the touches that
-//! leave are clear.
+//! Enters: the touches of a pass, what the tool must keep away from, mm, rad. Leaves: the touches, changed no
+//! more than it takes, in one pass or in several where a stretch cannot be reached, and what was changed.
+//! Moves between the touches that leave are clear.
 //!
-//! Axes are tried on rings around the rule's axis, the smallest tilt first, and follow the touch before. Each has a little to
-//! spare, so that the moves between them touch nothing. Stock is not considered: between passes the tool feeds beside
-//! the part, or goes outside the block.
+//! Axes are tried on rings around the rule's axis, the smallest tilt first, and follow the touch before. Each
+//! has a little to spare, so that the moves between them touch nothing. Stock is not considered: between
+//! passes the tool feeds beside the part, or goes outside the block.
 //!
-//! Curvature tells the lead that frees the rear of a flat near the contact only. On the far side of a trough the
-//! distance from the part finds the gouge.
+//! Curvature tells the lead that frees the rear of a flat near the contact only. On the far side of a trough
+//! the distance from the part finds the gouge.
 
 use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;
@@ -20,16 +20,18 @@ use motion::{CcPoint, ClPoint, location};
 use std::f64::consts::TAU;
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider ones.
+/// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider
+/// ones.
 const RING: f64 = 0.05;
 
-/// Axes tried on each ring: 10 degrees apart, as far as rings are where the axis is tilted by 0.29 rad. Narrower rings, which come
-/// first, are denser.
+/// Axes tried on each ring: 10 degrees apart, as far as rings are where the axis is tilted by 0.29 rad.
+/// Narrower rings, which come first, are denser.
 const AROUND: usize = 36;
 
-/// The share of its lean at which a tool must be clear as well, where its contact must be known well: a flat bottom then fills no
-/// more than about this share of the hollow's curvature, so that its contact moves by no more than 1/(1 − share), four times, of what it
-/// would on a plane. Nearer to 1 contacts spread; less leans more than it must.
+/// The share of its lean at which a tool must be clear as well, where its contact must be known well: a flat
+/// bottom then fills no more than about this share of the hollow's curvature, so that its contact moves by no
+/// more than 1/(1 − share), four times, of what it would on a plane. Nearer to 1 contacts spread; less leans
+/// more than it must.
 const LESS_LEAN: f64 = 0.75;
 
 /// Halvings of what lies between two rings: to a hundredth of a degree.
@@ -93,8 +95,9 @@ pub struct Room<'a> {
     pub cutter: &'a Cutter,
     /// What it keeps away from.
     pub keep: &'a Interference<'a>,
-    /// Whether the tool must be clear at [`LESS_LEAN`] of its lean from the normal, too. A flat bottom that only just fits into a
-    /// hollow touches all around, and where it touches is then known badly: so is how fast the axis turns there.
+    /// Whether the tool must be clear at [`LESS_LEAN`] of its lean from the normal, too. A flat bottom that
+    /// only just fits into a hollow touches all around, and where it touches is then known badly: so is how
+    /// fast the axis turns there.
     pub firm: bool,
 }
 
@@ -129,7 +132,8 @@ impl Room<'_> {
     }
 }
 
-/// Repairs a pass. Beside tilted contacts the axis turns by no more than `turning`, rad a mm of contact, where that is clear.
+/// Repairs a pass. Beside tilted contacts the axis turns by no more than `turning`, rad a mm of contact,
+/// where that is clear.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -211,7 +215,8 @@ impl<'a> Repairing<'a> {
         })
     }
 
-    /// The axis nearest to the rule's at which the tool is clear, near to that before where there is a choice.
+    /// The axis nearest to the rule's at which the tool is clear, near to that before where there is a
+    /// choice.
     fn tilt(&self, touch: &Touch, room: Room<'_>, spare: bool) -> Option<Vector3> {
         let (rule, contact) = (touch.at.axis, touch.contact);
         let across = if rule.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
@@ -263,8 +268,8 @@ impl<'a> Repairing<'a> {
         None
     }
 
-    /// How far the tool must go along the normal. What is missing shrinks no faster than the tool goes, so that it steps by
-    /// that without passing by a place that is clear.
+    /// How far the tool must go along the normal. What is missing shrinks no faster than the tool goes, so
+    /// that it steps by that without passing by a place that is clear.
     fn lift(&self, touch: &Touch) -> Option<f64> {
         let mut lift = 0.0;
         while lift <= self.room.keep.greatest_lift {
@@ -316,7 +321,8 @@ impl<'a> Repairing<'a> {
         Ok(())
     }
 
-    /// `to`, with its axis turned towards that of `from` where that is tilted no less, within a ring, and too far off.
+    /// `to`, with its axis turned towards that of `from` where that is tilted no less, within a ring, and too
+    /// far off.
     fn led_over(&self, from: &Placed, to: &Placed, rate: f64) -> Placed {
         let (a, b) = (from.touch.at, to.touch.at);
         let turn = a.axis.cross(&b.axis).norm().atan2(a.axis.dot(&b.axis));

@@ -1,16 +1,18 @@
 //! Passes of a cutter whose axis tilts: sampled where it touches, located, smoothed and thinned.
 //!
 //! Enters: contacts along a curve with the feed there, and a rule for the axis. Leaves: cutter locations
-//! between which the cutter strays from the exact path by no more than the chord tolerance, mm.
-//! Between two locations the tip runs straight and the axis turns evenly. What cuts is the cutter's arc,
-//! so its strays count: that of the arc's centre height on the axis, and the turn of the axis times the
-//! distance of the arc from it, which is none for a ball.
+//! between which the cutter strays from the exact path by no more than the chord tolerance, mm. Between two
+//! locations the tip runs straight and the axis turns evenly. What cuts is the cutter's arc, so its strays
+//! count: that of the arc's centre height on the axis, and the turn of the axis times the distance of the arc
+//! from it, which is none for a ball.
 //!
-//! Contacts are kept until the passes are ordered: a lead leans the other way on a pass that is cut backwards.
+//! Contacts are kept until the passes are ordered: a lead leans the other way on a pass that is cut
+//! backwards.
 //!
-//! Where cutters are dropped, a ball is tilted around its centre, so that every strategy serves five axes. For other
-//! cutters a ball as large as their corner is dropped and gives contact and normal; its normal turns over an edge as the ball
-//! rolls. Beside the border of a mesh its plane goes on, because a flat rolled over an edge would lean out.
+//! Where cutters are dropped, a ball is tilted around its centre, so that every strategy serves five axes.
+//! For other cutters a ball as large as their corner is dropped and gives contact and normal; its normal
+//! turns over an edge as the ball rolls. Beside the border of a mesh its plane goes on, because a flat rolled
+//! over an edge would lean out.
 
 use super::turning::LOST;
 use crate::moves::chord::{Side, Watch, moved_aside, reduced_indices, sample_within_chord};
@@ -26,8 +28,8 @@ use part::Part;
 use std::ops::Range;
 use work::monitor::{Cancelled, Monitor};
 
-/// Share of the chord tolerance that samples may stray, and that leaving samples out may add to that. A pass around the
-/// centres of upright moves has half of the tolerance behind it.
+/// Share of the chord tolerance that samples may stray, and that leaving samples out may add to that. A pass
+/// around the centres of upright moves has half of the tolerance behind it.
 const SAMPLING_SHARE: f64 = 0.1;
 const LOCATED_SHARE: f64 = 0.7;
 const AROUND_CENTRES_SHARE: f64 = 0.3;
@@ -111,8 +113,8 @@ pub(crate) fn along(
     refused.map_or(Ok(touches), |error| Err(PlanError::Axis(error)))
 }
 
-/// The radius of a probe is that of the cutter's corner, but no less than this share of its own: where facets meet, the
-/// normal turns over an arc of that radius; what is more hollow it does not reach into.
+/// The radius of a probe is that of the cutter's corner, but no less than this share of its own: where facets
+/// meet, the normal turns over an arc of that radius; what is more hollow it does not reach into.
 const PROBE_OVER_RADIUS: f64 = 0.25;
 
 /// The ball that is dropped to find where a cutter touches; `None` for a ball.
@@ -129,8 +131,8 @@ pub(crate) struct Dropped<'a> {
 }
 
 impl Dropped<'_> {
-    /// Where the ball touches while its centre is there. Beside the part's border the plane goes on on which the border lies,
-    /// for all but a ball that cuts itself.
+    /// Where the ball touches while its centre is there. Beside the part's border the plane goes on on which
+    /// the border lies, for all but a ball that cuts itself.
     fn contact(&self, part: &Part, border: Option<&Border<'_>>, centre: &Point3) -> Option<CcPoint> {
         let foot = part.closest_point(centre).0;
         let normal = (centre - foot.point).try_normalize(1e-9)?;
@@ -144,7 +146,8 @@ impl Dropped<'_> {
     }
 }
 
-/// A cutter tilted where a ball that was dropped upright touches: around its centre, if it is that ball itself.
+/// A cutter tilted where a ball that was dropped upright touches: around its centre, if it is that ball
+/// itself.
 ///
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis, or [`Cancelled`].
@@ -214,7 +217,8 @@ pub(crate) struct MoveRules<'a> {
 }
 
 impl MoveRules<'_> {
-    /// Whether the move from one touch of a pass to another holds; `passed` are those from the first to the second.
+    /// Whether the move from one touch of a pass to another holds; `passed` are those from the first to the
+    /// second.
     fn hold(&self, passed: &[Touch], a: &Touch, b: &Touch) -> bool {
         let angle = |a: &Vector3, b: &Vector3| a.cross(b).norm().atan2(a.dot(b));
         let way = b.contact.point - a.contact.point;
@@ -234,8 +238,8 @@ impl MoveRules<'_> {
     }
 }
 
-/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its own moves do;
-/// smoothed and spread by `smoothing`, mm, where that is asked for and holds them too.
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its
+/// own moves do; smoothed and spread by `smoothing`, mm, where that is asked for and holds them too.
 pub(crate) fn located(
     pass: &[Touch],
     tolerance: f64,
@@ -253,8 +257,8 @@ pub(crate) fn located(
     thinned(pass, tolerance, rules, monitor)
 }
 
-/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its own moves do. The
-/// pass runs on both sides of the moves where they are clear so, too.
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its
+/// own moves do. The pass runs on both sides of the moves where they are clear so, too.
 pub(crate) fn thinned(
     pass: &[Touch],
     tolerance: f64,

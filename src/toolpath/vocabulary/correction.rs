@@ -1,12 +1,12 @@
-//! What a measurement of the cut surface found about the distance of passes: by which factor it should be wider or narrower,
-//! from place to place.
+//! What a measurement of the cut surface found about the distance of passes: by which factor it should be
+//! wider or narrower, from place to place.
 //!
-//! Enters: measured places with a factor each, and the distance over which a factor holds, an interval between passes.
-//! Leaves: a continuous field of factors, 1 where nothing was measured.
+//! Enters: measured places with a factor each, and the distance over which a factor holds, an interval
+//! between passes. Leaves: a continuous field of factors, 1 where nothing was measured.
 //!
-//! Places are gathered in cubes of that distance. A cube has the least factor of its own and its 26 neighbours', so that the
-//! highest ridge rules what lies within an interval of it. Between the centres of cubes factors are interpolated; they are
-//! never more than the least one in the cube of a place.
+//! Places are gathered in cubes of that distance. A cube has the least factor of its own and its 26
+//! neighbours', so that the highest ridge rules what lies within an interval of it. Between the centres of
+//! cubes factors are interpolated; they are never more than the least one in the cube of a place.
 
 use geometry::Point3;
 
@@ -41,7 +41,8 @@ impl Default for Correction {
 }
 
 impl Correction {
-    /// From places and factors (positive), each of which holds for `reach` mm around; 1 everywhere without any.
+    /// From places and factors (positive), each of which holds for `reach` mm around; 1 everywhere without
+    /// any.
     pub fn new(places: &[(Point3, f64)], reach: f64) -> Self {
         let sound = |&&(p, factor): &&(Point3, f64)| {
             factor > 0.0 && factor.is_finite() && p.iter().all(|x| x.is_finite())

@@ -22,8 +22,8 @@ pub enum Lines {
     /// Its levels, placed for the shortest passes.
     #[default]
     Levels,
-    /// Its streamlines, traced by Runge–Kutta steps of fourth order from seeds: each as far from the line before as the narrowest strip
-    /// along both allows.
+    /// Its streamlines, traced by Runge–Kutta steps of fourth order from seeds: each as far from the line
+    /// before as the narrowest strip along both allows.
     RungeKutta,
 }
 
@@ -69,11 +69,11 @@ pub enum FeedDirection {
         /// Along or across them.
         sense: Sense,
     },
-    /// From the borders of the part, of each patch where patches are planned one by one; inside, the smoothest field
-    /// that they allow.
+    /// From the borders of the part, of each patch where patches are planned one by one; inside, the
+    /// smoothest field that they allow.
     Border(Sense),
-    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
-    /// much its direction matters at the place.
+    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights,
+    /// each times how much its direction matters at the place.
     Blend(Vec<(FeedDirection, f64)>),
 }
 

@@ -1,5 +1,5 @@
-//! The words in which passes are asked for and handed over: settings, feed directions, passes, refusals. Every room of the
-//! planner speaks them; they know none of the rooms that cover a surface.
+//! The words in which passes are asked for and handed over: settings, feed directions, passes, refusals.
+//! Every room of the planner speaks them; they know none of the rooms that cover a surface.
 
 mod correction;
 mod error;

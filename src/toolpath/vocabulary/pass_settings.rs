@@ -16,20 +16,21 @@ pub(crate) const SAMPLING_OVER_RADIUS: f64 = 0.15;
 /// First samples over a jump, as a share of it: none is longer than the cutter is wide.
 const STEP_OF_JUMP: f64 = 0.5 * SAMPLING_OVER_RADIUS;
 
-/// Of plans that are compared, one with the other, chords are this many times as far off as may be: they take as long, nearly,
-/// and are made sooner.
+/// Of plans that are compared, one with the other, chords are this many times as far off as may be: they take
+/// as long, nearly, and are made sooner.
 pub(crate) const COMPARED_CHORDS: f64 = 4.0;
 
-/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
-/// between chords of two passes, and passes lie the closer the more chords may raise them.
+/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it:
+/// ridges stand between chords of two passes, and passes lie the closer the more chords may raise them.
 const SAMPLING_SHARE: f64 = 0.1;
 const REDUCTION_SHARE: f64 = 0.4;
 
-/// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it there are 15 % fewer
-/// points, but 2 % of the ridges of a saddle stand over the target.
+/// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it
+/// there are 15 % fewer points, but 2 % of the ridges of a saddle stand over the target.
 const SMOOTHED_SHARE: f64 = 0.78;
 
-/// What a chord tolerance has left after sampling and point reduction, or smoothing, mm: by so much may points go deeper.
+/// What a chord tolerance has left after sampling and point reduction, or smoothing, mm: by so much may
+/// points go deeper.
 pub fn unused_tolerance(chord_tolerance: f64, is_smoothed: bool) -> f64 {
     let share = if is_smoothed { SMOOTHED_SHARE * (1.0 - SAMPLING_SHARE) } else { REDUCTION_SHARE };
     (1.0 - SAMPLING_SHARE - share) * chord_tolerance
@@ -73,7 +74,8 @@ pub struct PassSettings<'a> {
     pub memory: u64,
     /// What an earlier plan left.
     pub earlier: Option<&'a Earlier>,
-    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
+    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the
+    /// contacts of that.
     pub probe: Option<&'a Cutter>,
 }
 
@@ -108,8 +110,8 @@ impl<'a> PassSettings<'a> {
         self.reduced(&points, &mut watch)
     }
 
-    /// As [`Self::moves`] of a cutter that is located by where it touches: at a kink of the surface its tip jumps, and is
-    /// carried from one side to the other by being dropped along the way.
+    /// As [`Self::moves`] of a cutter that is located by where it touches: at a kink of the surface its tip
+    /// jumps, and is carried from one side to the other by being dropped along the way.
     ///
     /// # Errors
     /// As [`Self::moves`].
@@ -160,8 +162,8 @@ mod tests {
     use part::Part;
     use work::monitor::Silent;
 
-    /// A flat end goes around the corner of a block, for a while over nothing, and down to a floor beside it: it leaves the corner
-    /// before it goes down, however far the floor is.
+    /// A flat end goes around the corner of a block, for a while over nothing, and down to a floor beside it:
+    /// it leaves the corner before it goes down, however far the floor is.
     #[test]
     fn no_ramp_leads_past_a_corner() {
         let quad = |[x0, x1]: [f64; 2], z: f64| {

@@ -13,7 +13,8 @@ use geometry::{Point3, Vector3};
 pub struct Passes {
     /// Tip positions of each pass.
     pub passes: Vec<Vec<Point3>>,
-    /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.
+    /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright
+    /// one.
     pub touches: Vec<Vec<Touch>>,
     /// Remarks.
     pub notes: Vec<String>,
@@ -52,8 +53,8 @@ impl Faces {
     /// Whatever their slope.
     pub const ALL: Self = Self { least: -1.0, most: 1.0 };
 
-    /// Those with slopes between two angles from the level, rad; from level ground, or down to upright walls and beyond, where the range ends
-    /// there.
+    /// Those with slopes between two angles from the level, rad; from level ground, or down to upright walls
+    /// and beyond, where the range ends there.
     pub fn of_slopes([from, to]: [f64; 2]) -> Self {
         let least = if to < FRAC_PI_2 { to.cos() - SLOPE_ROUNDING } else { Self::ALL.least };
         let most = if from > 0.0 { from.cos() + SLOPE_ROUNDING } else { Self::ALL.most };
@@ -91,8 +92,8 @@ pub struct Kept {
     pub faces: Faces,
 }
 
-/// A function whose levels are passes, on one chart or piece of the part: kept, so that levels can be placed anew without
-/// another search for it.
+/// A function whose levels are passes, on one chart or piece of the part: kept, so that levels can be placed
+/// anew without another search for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Levelled {
     /// The function.

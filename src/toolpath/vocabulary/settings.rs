@@ -1,4 +1,5 @@
-//! What every path is planned by: how far passes lie apart, tolerance, heights, rates, and how passes are joined.
+//! What every path is planned by: how far passes lie apart, tolerance, heights, rates, and how passes are
+//! joined.
 
 use std::sync::Arc;
 
@@ -57,20 +58,22 @@ pub struct PlanSettings {
     /// The stock as a block, mm: between passes a tool that leans goes around it. `None`
     /// where it is as wide as the part, and reaches from the part's lowest point to `stock_top`.
     pub stock: Option<Aabb>,
-    /// Whether an upright tool may come down beside `stock`: nothing else stands there, and it is known to be no wider.
+    /// Whether an upright tool may come down beside `stock`: nothing else stands there, and it is known to be
+    /// no wider.
     pub may_enter_beside: bool,
     /// Feed along passes, mm/min.
     pub feed_rate: f64,
     /// Feed down to a pass, mm/min.
     pub plunge_rate: f64,
-    /// The machine: its rapid rate decides between links on the surface and retracts, and machining times are its own.
+    /// The machine: its rapid rate decides between links on the surface and retracts, and machining times are
+    /// its own.
     pub machine: Machine,
     /// How passes are smoothed and joined.
     pub joining: Joining,
     /// Which faces are to have passes.
     pub faces: Faces,
-    /// Whether what chords leave above the scallop height is measured and moves beside it go deeper then ([`Earlier::lowered`]): passes lie as
-    /// far apart as if chords raised nothing.
+    /// Whether what chords leave above the scallop height is measured and moves beside it go deeper then
+    /// ([`Earlier::lowered`]): passes lie as far apart as if chords raised nothing.
     pub is_lowered_later: bool,
     /// What the tables of a plan may take beside its path, bytes; less makes them coarser.
     pub memory: u64,
@@ -83,38 +86,42 @@ pub struct PlanSettings {
 pub struct Earlier {
     /// By what passes spaced for a scallop lie wider or narrower than by calculation.
     pub correction: Correction,
-    /// Places beside which moves of an upright cutter go a little deeper, round after round, where its passes stay as they are.
+    /// Places beside which moves of an upright cutter go a little deeper, round after round, where its passes
+    /// stay as they are.
     pub lowered: Vec<Vec<Lowered>>,
     /// Places on the design over which passes of their own are added, the most needed first.
     pub touch_up: Vec<Point3>,
     /// What its strategy planned: levels of its functions are placed anew.
     pub kept: Arc<Kept>,
-    /// Whether its passes stay as they are: they were planned by the same factors, and only passes of their own are added.
+    /// Whether its passes stay as they are: they were planned by the same factors, and only passes of their
+    /// own are added.
     pub again: bool,
 }
 
 /// The scallop height that passes are planned for by default, mm: what finishing of moulds and dies leaves.
 const SCALLOP: f64 = 0.01;
 
-/// The chord tolerance by default, mm: a tenth of the scallop, so that ridges are those of passes. A greater one shows facets,
-/// a lesser one makes programs longer as its inverse root.
+/// The chord tolerance by default, mm: a tenth of the scallop, so that ridges are those of passes. A greater
+/// one shows facets, a lesser one makes programs longer as its inverse root.
 const CHORD_TOLERANCE: f64 = 0.001;
 
-/// The clearance of rapid moves by default, mm: more than clamps and burrs bring stock out of place, and little air.
+/// The clearance of rapid moves by default, mm: more than clamps and burrs bring stock out of place, and
+/// little air.
 const CLEARANCE: f64 = 2.0;
 
 /// The feed along passes by default, mm/min: one that a ball of 6 mm takes in steel.
 const FEED_RATE: f64 = 1000.0;
 
-/// The feed down to a pass by default, mm/min: a third or less of the feed along it, since the tip of a cutter hardly cuts.
+/// The feed down to a pass by default, mm/min: a third or less of the feed along it, since the tip of a
+/// cutter hardly cuts.
 const PLUNGE_RATE: f64 = 300.0;
 
 /// What tables may take by default, bytes: more makes none finer.
 const MEMORY: u64 = 2 << 30;
 
 impl Default for PlanSettings {
-    /// Finishing by scallop height under stock whose highest point is at z = 0: set `stock_top` where stock is higher, or
-    /// rapid moves run through it.
+    /// Finishing by scallop height under stock whose highest point is at z = 0: set `stock_top` where stock
+    /// is higher, or rapid moves run through it.
     fn default() -> Self {
         Self {
             step: Step::Scallop(SCALLOP),

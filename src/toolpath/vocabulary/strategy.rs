@@ -1,7 +1,7 @@
 //! What a strategy is: its name and keys in a scene, and its passes.
 //!
-//! Each strategy is one file under `strategies` (those of pockets: `pocket/strategy.rs`), which holds its parameters, its
-//! [`Definition`] with the reader, the writer and the planner, and one line in the list
+//! Each strategy is one file under `strategies` (those of pockets: `pocket/strategy.rs`), which holds its
+//! parameters, its [`Definition`] with the reader, the writer and the planner, and one line in the list
 //! [`STRATEGIES`](crate::STRATEGIES).
 
 use std::any::Any;

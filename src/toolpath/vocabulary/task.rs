@@ -30,8 +30,9 @@ pub struct Pace<'a> {
 }
 
 impl Pace<'_> {
-    /// How many mm of pass at the feed a mm along a surface of some curvature takes more than one, where the cutter's centre, `radius` mm
-    /// off the surface, follows a tighter bend than the machine runs at the feed: its speed falls as the root of the bend's radius.
+    /// How many mm of pass at the feed a mm along a surface of some curvature takes more than one, where the
+    /// cutter's centre, `radius` mm off the surface, follows a tighter bend than the machine runs at the
+    /// feed: its speed falls as the root of the bend's radius.
     pub fn slowed(&self, curvature: f64, radius: f64) -> f64 {
         let bend = self.bend * curvature.abs() / (1.0 - curvature * radius).abs().max(f64::MIN_POSITIVE);
         (bend.sqrt() - 1.0).max(0.0)
@@ -47,7 +48,8 @@ pub struct Task<'a> {
     pub cutter: &'a Cutter,
     /// How.
     pub settings: PassSettings<'a>,
-    /// Whether no smooth surface follows the part (steps, holes, several patches), so that its mesh has to serve.
+    /// Whether no smooth surface follows the part (steps, holes, several patches), so that its mesh has to
+    /// serve.
     pub wants_mesh: bool,
     /// How quick the machine is.
     pub pace: Pace<'a>,
@@ -61,7 +63,8 @@ impl<'a> Task<'a> {
         self.settings.dropped(self.cutter)
     }
 
-    /// Whether a tilted cutter follows the level curves of a coordinate on patches by its contacts, instead of being dropped.
+    /// Whether a tilted cutter follows the level curves of a coordinate on patches by its contacts, instead
+    /// of being dropped.
     pub fn follows_contacts(&self) -> bool {
         self.settings.axis.is_some() && !self.part.patches().is_empty()
     }

@@ -4,7 +4,8 @@ use super::super::run;
 use crate::args::RunOptions;
 use crate::progress::Progress;
 
-/// Runs a suction side that leans by 20 degrees out of its sections' planes, straight or hollow; its `offset` and notes.
+/// Runs a suction side that leans by 20 degrees out of its sections' planes, straight or hollow; its `offset`
+/// and notes.
 fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_json::Value, String) {
     let path = path_of(side, offset, diameter);
     (path["offset"].clone(), path["notes"].to_string())
@@ -70,8 +71,8 @@ fn a_run_tells_what_its_offset_surface_is_off_the_part() {
 
 #[test]
 fn a_run_tells_where_its_ball_does_not_fit() {
-    // At its bottom x = 6 the hollow bends with y'' = 2 (0.2 + 7.2 · 0.05) = 1.12 in the section, times the cosine of the
-    // lean in the surface.
+    // At its bottom x = 6 the hollow bends with y'' = 2 (0.2 + 7.2 · 0.05) = 1.12 in the section, times the
+    // cosine of the lean in the surface.
     let hollow = |x: f64| 0.2 * ((x - 6.0).powi(2) - 36.0) / (1.0 + 0.05 * (x - 6.0).powi(2));
     let (offset, notes) = offset_of(&hollow, "normal", 6.0);
     let worst = &offset["singular_places"][0];
@@ -85,15 +86,16 @@ fn a_run_tells_where_its_ball_does_not_fit() {
     assert_eq!(small["singular_place_count"], 0);
 }
 
-/// How deep the published offset of a hollow that is narrower than the ball cuts, by brute force: of each centre, its radius less
-/// its distance from the part.
+/// How deep the published offset of a hollow that is narrower than the ball cuts, by brute force: of each
+/// centre, its radius less its distance from the part.
 #[test]
 fn an_offset_that_crosses_itself_is_cut_as_it_is_and_judged() {
     let hollow = |x: f64| 0.2 * ((x - 6.0).powi(2) - 36.0) / (1.0 + 0.05 * (x - 6.0).powi(2));
     let slope = |x: f64| (hollow(x + 1e-6) - hollow(x - 1e-6)) / 2e-6;
     let lean = 20_f64.to_radians().tan();
     let radius = 3.0;
-    // Through a centre, the part has the same section everywhere, moved by the lean: a place `up` higher lies `up lean` farther.
+    // Through a centre, the part has the same section everywhere, moved by the lean: a place `up` higher lies
+    // `up lean` farther.
     let distance = |centre: [f64; 2]| {
         let places =
             (0..=1200).flat_map(|k| (-120..=120).map(move |up| (0.01 * f64::from(k), 0.02 * f64::from(up))));

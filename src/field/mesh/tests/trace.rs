@@ -62,8 +62,8 @@ fn senses_do_not_matter_and_lines_end_at_borders() {
     assert!(worst < 1e-4, "{worst}");
 }
 
-/// The flow around a hole that nothing forces: ψ of elements with one value along each border. Its levels, and lines traced
-/// along its recovered gradient turned by a right angle, are the same lines.
+/// The flow around a hole that nothing forces: ψ of elements with one value along each border. Its levels,
+/// and lines traced along its recovered gradient turned by a right angle, are the same lines.
 #[test]
 fn levels_and_traced_lines_of_a_flow_around_a_hole_agree() {
     let (inner, outer): (f64, f64) = (4.0, 20.0);
@@ -110,8 +110,9 @@ fn levels_and_traced_lines_of_a_flow_around_a_hole_agree() {
     assert!(fine < 0.005 && fine < 0.4 * coarse, "{coarse} {fine}");
 }
 
-/// On a curved mesh, too, levels and lines that are traced along the recovered gradient turned by a right angle agree: by the chord
-/// tolerance of 5 µm on triangles of 0.2 mm over 20 mm, and by the square of their sides.
+/// On a curved mesh, too, levels and lines that are traced along the recovered gradient turned by a right
+/// angle agree: by the chord tolerance of 5 µm on triangles of 0.2 mm over 20 mm, and by the square of their
+/// sides.
 #[test]
 fn levels_and_traced_lines_of_a_curved_mesh_agree() {
     let worst = |n: usize| {

@@ -142,7 +142,8 @@ fn reading_back_gives_the_locations() {
                     Style::Tcp => Point3::from(Vector3::from_column_slice(&state.words[..3])),
                     Style::Full => at.tip,
                 };
-                // Half of the last decimal on three axes; angles turn the lengths of the machine, 600 mm, besides.
+                // Half of the last decimal on three axes; angles turn the lengths of the machine, 600 mm,
+                // besides.
                 assert!(
                     (tip - step.to.tip).norm() < 0.9e-4 + 1.3e-4,
                     "{name} move {k}: {tip} {}",
@@ -229,7 +230,8 @@ fn no_joint_is_faster_than_its_rate() {
     }
 }
 
-/// By differences of the joints that a control passes while it keeps the tip on its line, at the feed of the word.
+/// By differences of the joints that a control passes while it keeps the tip on its line, at the feed of the
+/// word.
 #[test]
 fn no_joint_is_faster_than_its_rate_where_the_control_keeps_the_tip() {
     let mut path = tilting_path();
@@ -268,8 +270,8 @@ fn no_joint_is_faster_than_its_rate_where_the_control_keeps_the_tip() {
     }
 }
 
-/// Up along the machine's z alone, then the rotary axes alone, then X and Y, then Z down from above the whole path, and up again
-/// before the end, for both styles.
+/// Up along the machine's z alone, then the rotary axes alone, then X and Y, then Z down from above the whole
+/// path, and up again before the end, for both styles.
 #[test]
 fn programs_begin_and_end_above_the_work() {
     let path = tilting_path();
@@ -318,7 +320,8 @@ fn programs_begin_and_end_above_the_work() {
     }
 }
 
-/// Up, turn, over, down: before the control keeps the tip the linear axes stand over the start, and then go straight down.
+/// Up, turn, over, down: before the control keeps the tip the linear axes stand over the start, and then go
+/// straight down.
 #[test]
 fn a_program_that_keeps_the_tip_comes_down_along_the_machines_z() {
     let path = tilting_path();
@@ -511,9 +514,9 @@ fn a_rewind_is_made_at_the_top() {
     }
 }
 
-/// LinuxCNC's `xyzac-trt` and `xyzbc-trt`, whose tables count as they turn themselves. `trunnion_*.ngc` of tests/programs are our
-/// programs for them, and rs274 goes through our locations (`trunnion_*.motion`; the README there says how they are made).
-/// `MILLSTREAM_BLESS=1` writes the programs anew.
+/// LinuxCNC's `xyzac-trt` and `xyzbc-trt`, whose tables count as they turn themselves. `trunnion_*.ngc` of
+/// tests/programs are our programs for them, and rs274 goes through our locations (`trunnion_*.motion`; the
+/// README there says how they are made). `MILLSTREAM_BLESS=1` writes the programs anew.
 #[test]
 fn linuxcnc_goes_through_the_locations_of_programs_that_keep_the_tip() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/programs");
@@ -533,7 +536,8 @@ fn linuxcnc_goes_through_the_locations_of_programs_that_keep_the_tip() {
         }
         assert_eq!(std::fs::read_to_string(&file).unwrap(), text, "{name}");
 
-        // X Y Z and both rotary axes from where the control begins to keep the tip, and up again before it ends.
+        // X Y Z and both rotary axes from where the control begins to keep the tip, and up again before it
+        // ends.
         let start = JointLocation { joints: joints.start, at: path.start, ..joints.locations[0] };
         let ends = [&start, joints.locations.last().unwrap()];
         let [over, up] = ends.map(|end| {

@@ -5,7 +5,8 @@ use svgtypes::Length;
 
 use super::{OutlineError, fault};
 
-/// Properties that hide, clip or place outlines and are read from styles of single elements, and as attributes.
+/// Properties that hide, clip or place outlines and are read from styles of single elements, and as
+/// attributes.
 const READ: [&str; 9] = [
     "display",
     "visibility",
@@ -111,7 +112,8 @@ fn without_comments(text: &str) -> String {
     bare
 }
 
-/// Refuses rules of a style sheet that shape or hide outlines: they are not applied. Says whether its rules set pens.
+/// Refuses rules of a style sheet that shape or hide outlines: they are not applied. Says whether its rules
+/// set pens.
 pub(super) fn check_sheet(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
     let text: String = node.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
     let bare = without_comments(&text);

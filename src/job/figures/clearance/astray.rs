@@ -1,4 +1,5 @@
-//! Where joints lead the tool astray between the lines of a program: bounds of gouges and clearances against the motion of the joints.
+//! Where joints lead the tool astray between the lines of a program: bounds of gouges and clearances against
+//! the motion of the joints.
 
 use super::tests::Home;
 use crate::{Outcome, Session};
@@ -11,7 +12,8 @@ use report::Verdict;
 /// Places looked at on each line.
 const PLACES: usize = 8;
 
-/// Where the joints bring the tool, with the move, all along the path; the control may keep the `tip` on its line.
+/// Where the joints bring the tool, with the move, all along the path; the control may keep the `tip` on its
+/// line.
 fn motion(session: &Session, outcome: &Outcome, tip_kept: bool) -> Vec<(ClPoint, usize)> {
     let machine = &session.scene.five_axis.as_ref().unwrap().kinematics;
     let joints = outcome.joints.as_ref().unwrap();
@@ -30,8 +32,8 @@ fn motion(session: &Session, outcome: &Outcome, tip_kept: bool) -> Vec<(ClPoint,
     all
 }
 
-/// The head leans by up to 11 degrees over a gauge length of 300 mm, and all joints run evenly: the ball sinks below a plane between
-/// lines, by the length times an eighth of the square of their turn.
+/// The head leans by up to 11 degrees over a gauge length of 300 mm, and all joints run evenly: the ball
+/// sinks below a plane between lines, by the length times an eighth of the square of their turn.
 #[test]
 fn what_joints_cut_between_lines_is_within_the_bound_of_the_gouge() {
     let scene = |chord: f64| {

@@ -1,8 +1,9 @@
 //! The machine's own bodies, and the tool on its way to the path and away from it.
 //!
-//! Along all joints of the program: what the head carries against part, fixtures, stock ([`uncut`]) and what the table side carries; the tool against the
-//! latter; what turns on the table side against part, fixtures and stock, where it does not carry them. Bodies that carry
-//! one another, or the tool, are not held against each other.
+//! Along all joints of the program: what the head carries against part, fixtures, stock ([`uncut`]) and what
+//! the table side carries; the tool against the latter; what turns on the table side against part, fixtures
+//! and stock, where it does not carry them. Bodies that carry one another, or the tool, are not held against
+//! each other.
 
 use collision::{Body, LeastClearance, Obstacle};
 use geometry::{Bvh, Isometry3, Point3, TriangleMesh};

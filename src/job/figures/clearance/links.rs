@@ -1,5 +1,5 @@
-//! Links of leaning tools across fixtures, against distances that share nothing with the engine: from the line in the middle of
-//! the tool to a box.
+//! Links of leaning tools across fixtures, against distances that share nothing with the engine: from the
+//! line in the middle of the tool to a box.
 
 use super::tests::Home;
 use crate::Outcome;
@@ -44,7 +44,8 @@ fn planned(home: &Home, files: &[String], machine: &str) -> Outcome {
     home.outcome(&scene(files, machine))
 }
 
-/// From a box to the tool, whose upper end is out of reach: convex along the middle of the tool, on which thirds close in.
+/// From a box to the tool, whose upper end is out of reach: convex along the middle of the tool, on which
+/// thirds close in.
 fn distance(at: &ClPoint, bounds: &Aabb) -> f64 {
     let off = |along: f64| {
         let p: Point3 = at.tip + at.axis * along;
@@ -83,7 +84,8 @@ fn least(outcome: &Outcome, file: &str, bounds: &Aabb) -> (f64, f64, f64) {
     (moves.fold(f64::INFINITY, f64::min), told, bound)
 }
 
-/// A wall across the plate, lower than the tool is long, and a post taller than the heights at which the tool goes by.
+/// A wall across the plate, lower than the tool is long, and a post taller than the heights at which the tool
+/// goes by.
 #[test]
 fn a_leaning_tool_goes_over_a_wall_and_beside_a_post() {
     let wall = block([19.0, -10.0, -2.0], [21.0, 30.0, 12.0]);

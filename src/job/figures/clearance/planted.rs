@@ -61,7 +61,8 @@ impl Case {
         self.home.solid("clamp.stl", [x[0], -20.0, z - 2.0], [x[1], 20.0, z + 2.0]);
     }
 
-    /// Where the tip is when the lowest place of a rim, so far above the tip and so wide, is over the plate at `z`.
+    /// Where the tip is when the lowest place of a rim, so far above the tip and so wide, is over the plate
+    /// at `z`.
     fn tip_under_rim(&self, [bottom, radius]: [f64; 2], z: f64) -> [f64; 3] {
         let [x, up] = self.axis;
         [3.0 - bottom * x - radius * up, 3.0, z - bottom * up + radius * x]

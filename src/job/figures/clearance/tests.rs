@@ -86,7 +86,8 @@ pub(super) fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
     result.claims.iter().find(of_pair).unwrap_or_else(|| panic!("{:#?}", result.claims))
 }
 
-/// Passes that run aslant toward a clamp end where its clearance begins, and the last decimals of the program stay outside.
+/// Passes that run aslant toward a clamp end where its clearance begins, and the last decimals of the program
+/// stay outside.
 #[test]
 fn what_the_planner_keeps_off_stays_off_as_written() {
     let home = Home::new("aslant");
@@ -174,8 +175,8 @@ fn held(length: f64) -> String {
     )
 }
 
-/// The first pass runs 4 mm below the top of the block, and the holder over stock that no pass has cut yet. On the
-/// finished plate the same holder would stand as high as it is long.
+/// The first pass runs 4 mm below the top of the block, and the holder over stock that no pass has cut yet.
+/// On the finished plate the same holder would stand as high as it is long.
 #[test]
 fn an_upright_holder_is_held_against_the_stock_that_stands_when_it_comes() {
     let home = Home::new("standing");

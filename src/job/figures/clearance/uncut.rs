@@ -1,6 +1,8 @@
-//! The stock as it was at first, for bodies that cut nothing of it: what is clear of it is clear of all that stands later.
+//! The stock as it was at first, for bodies that cut nothing of it: what is clear of it is clear of all that
+//! stands later.
 //!
-//! What meets it collides where no move before has come to the place; else it is open whether anything stood there by then.
+//! What meets it collides where no move before has come to the place; else it is open whether anything stood
+//! there by then.
 
 use collision::{Body, Obstacle};
 use cutter::Solid;
@@ -105,7 +107,8 @@ pub(super) fn pair(
     if least.nearest.distance >= 0.0 {
         return Ok(Some(motion.told(name, other, &moves, least)));
     }
-    // The first contact: least is cut by then. Nothing before `clear` touches, something before `touching` does.
+    // The first contact: least is cut by then. Nothing before `clear` touches, something before `touching`
+    // does.
     let (mut clear, mut touching, mut first) = (0, least.move_index + 1, least);
     while touching - clear > 1 {
         let middle = clear + (touching - clear) / 2;

@@ -191,8 +191,8 @@ fn limits_that_cannot_be_kept_are_told() {
     assert!(follow(&machine, &none, &FINE).unwrap().locations.is_empty());
 }
 
-/// A table far off its axis: between locations X bulges by an eighth of the square of the turn times the distance. Where the rotary
-/// axes stand still, or all joints run evenly, it does not.
+/// A table far off its axis: between locations X bulges by an eighth of the square of the turn times the
+/// distance. Where the rotary axes stand still, or all joints run evenly, it does not.
 #[test]
 fn linear_joints_that_bulge_between_locations_are_told() {
     let [first, second] = preset("ac-table").unwrap();

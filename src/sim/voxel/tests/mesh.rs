@@ -9,8 +9,8 @@ fn surface_of(stock: &Stock, solid: &Solid, path: &Toolpath, voxel: f64) -> Voxe
     engine.surface(&voxels, &Silent).unwrap()
 }
 
-/// Each edge once each way, also where vertices of equal f32 coordinates are one, as readers of STL files take them; and the
-/// triangles around each vertex in one ring.
+/// Each edge once each way, also where vertices of equal f32 coordinates are one, as readers of STL files
+/// take them; and the triangles around each vertex in one ring.
 fn assert_closed(surface: &VoxelSurface, name: &str) {
     let mut known: HashMap<[u32; 3], u32> = HashMap::new();
     let welded: Vec<u32> = surface

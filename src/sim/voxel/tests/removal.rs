@@ -61,7 +61,8 @@ fn upright_moves_take_what_the_z_map_says() {
     }
 }
 
-/// A cylinder that leans by θ in the plane across its feed: its section is a strip from the bottom, slanting, to the top.
+/// A cylinder that leans by θ in the plane across its feed: its section is a strip from the bottom, slanting,
+/// to the top.
 #[test]
 fn a_leaning_slot_has_the_section_of_its_closed_form() {
     let (radius, depth, lean, step) = (3.0, 4.0, 0.35f64, 1.3);

@@ -97,8 +97,8 @@ fn random_cut(rng: &mut Rng, k: usize) -> (Round, Stock, Toolpath, f64) {
             (round, stock, path_through([at(-40.0), at(40.0)]), 24.0 * area)
         }
         _ => {
-            // A flat end that turns about its own tip, inside of the stock: at x a rectangle of half width w, whose far
-            // corners run on a circle about the middle of its near side.
+            // A flat end that turns about its own tip, inside of the stock: at x a rectangle of half width w,
+            // whose far corners run on a circle about the middle of its near side.
             let radius = 0.4 * radius;
             let round = Round { radius, corner: 0.0 };
             let long = Solid::of_cutter(&round.cutter(), None).heights()[1];

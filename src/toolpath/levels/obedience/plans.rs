@@ -1,4 +1,5 @@
-//! Plans of small parts, whose directions are known in closed form: what is reported is what their finished moves do.
+//! Plans of small parts, whose directions are known in closed form: what is reported is what their finished
+//! moves do.
 
 use crate::plan::{Plan, plan};
 use crate::strategies::shortest::{Objective, ShortestStreamline};
@@ -36,8 +37,8 @@ fn planned(part: &Part, strategy: &dyn Strategy) -> (Plan, DirectionError) {
     (plan, error)
 }
 
-/// Root mean square and greatest angle, degrees, between the contacts of the finished moves and a direction: a tangent of the surface
-/// by place and unit normal.
+/// Root mean square and greatest angle, degrees, between the contacts of the finished moves and a direction:
+/// a tangent of the surface by place and unit normal.
 fn of_moves(plan: &Plan, part: &Part, asked: impl Fn(&Point3, &Vector3) -> Option<Vector3>) -> [f64; 2] {
     let (mut squares, mut length, mut most) = (0.0, 0.0, 0.0f64);
     for pass in &plan.kept.passes {
@@ -69,8 +70,9 @@ fn of_moves(plan: &Plan, part: &Part, asked: impl Fn(&Point3, &Vector3) -> Optio
     [(squares / length).sqrt(), most]
 }
 
-/// What is reported is as great as what moves do, within its bound and what chords are off their curves. Contacts by elements turn more
-/// sharply than chords show, where the surface is nearly as concave as the cutter: by up to two thirds.
+/// What is reported is as great as what moves do, within its bound and what chords are off their curves.
+/// Contacts by elements turn more sharply than chords show, where the surface is nearly as concave as the
+/// cutter: by up to two thirds.
 fn is_told(name: &str, error: &DirectionError, [rms, most]: [f64; 2], slack: f64) {
     let [told_rms, told, bound] = [error.rms, error.max, error.error_bound].map(f64::to_degrees);
     println!("{name}: {told_rms:.3} {told:.3} ± {bound:.3} at {:?}, moves {rms:.3} {most:.3}", error.at);

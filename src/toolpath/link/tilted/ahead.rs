@@ -1,7 +1,7 @@
 //! The way that a leaning cutter runs on over the border at the end of a pass.
 //!
-//! A flat or bull nose end mill that leans forward cuts with the front of its rim. Half an interval aside the rim lies
-//! behind the contact, so a pass that ends at the border leaves the corners of its strip standing.
+//! A flat or bull nose end mill that leans forward cuts with the front of its rim. Half an interval aside the
+//! rim lies behind the contact, so a pass that ends at the border leaves the corners of its strip standing.
 
 use crate::moves::touch::Touch;
 use crate::vocabulary::{Setup, Step};
@@ -11,8 +11,8 @@ use motion::{AxisError, CcPoint, ToolAxis};
 /// A lean forward below this, as a sine, is none: the bottom of the cutter covers what is aside.
 const LEAST_LEAN: f64 = 1e-3;
 
-/// Beyond the border a pass goes on in its tangent plane. Where the part goes on with a normal off by more than this, as
-/// its cosine, there is an edge instead.
+/// Beyond the border a pass goes on in its tangent plane. Where the part goes on with a normal off by more
+/// than this, as its cosine, there is an edge instead.
 const SAME_PLANE: f64 = 0.9;
 
 /// A place within this share of the cutter's radius of the part lies on it.

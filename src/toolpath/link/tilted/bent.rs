@@ -1,9 +1,11 @@
-//! Links of a tilted cutter on the surface: from the end of a pass to the start of the next over contacts in between.
+//! Links of a tilted cutter on the surface: from the end of a pass to the start of the next over contacts in
+//! between.
 //!
-//! In the tangent plane half way a link is a bend of upright passes ([`curves`]); its places are carried to the nearest
-//! contact of the part, beyond the border to the plane that continues it. The axis turns evenly over the length of the
-//! link; where it follows the feed, and the cutter is no ball, it keeps its lead and tilt and so leads the contact around
-//! the cutter, which would leap from one side to the other of a flat end if the axis went through the normal.
+//! In the tangent plane half way a link is a bend of upright passes ([`curves`]); its places are carried to
+//! the nearest contact of the part, beyond the border to the plane that continues it. The axis turns evenly
+//! over the length of the link; where it follows the feed, and the cutter is no ball, it keeps its lead and
+//! tilt and so leads the contact around the cutter, which would leap from one side to the other of a flat end
+//! if the axis went through the normal.
 
 use crate::link::bend::{Cubic, End, MOST_ROLL, SAMPLING, TANGENT, curves};
 use crate::moves::chord::{Watch, sample_within_chord};
@@ -40,8 +42,8 @@ pub struct Bent<'a> {
 }
 
 impl Bent<'_> {
-    /// The locations after `from` up to and with `to`; `None` where a link would be too long, roll too far over the
-    /// border, turn the axis too fast, or not be clear.
+    /// The locations after `from` up to and with `to`; `None` where a link would be too long, roll too far
+    /// over the border, turn the axis too fast, or not be clear.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.

@@ -230,7 +230,8 @@ fn a_wall_between_two_passes_is_gone_over() {
     assert!(beside.iter().all(|(_, kind)| *kind == MoveKind::Link));
 }
 
-/// Passes farther apart than the cutter is wide nearly, below a stock of 12 mm: it stands where the tool comes down.
+/// Passes farther apart than the cutter is wide nearly, below a stock of 12 mm: it stands where the tool
+/// comes down.
 #[test]
 fn through_standing_stock_the_tool_goes_down_at_the_plunge_rate() {
     let (part, cutter) = (plate(), Cutter::ball(6.0).unwrap());

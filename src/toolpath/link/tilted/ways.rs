@@ -1,25 +1,29 @@
 //! Ways of a tilted cutter between two places where it touches, and the quickest of those that are clear.
 //!
 //! - On the surface ([`bent`](super::bent)), fed, where links on the surface are asked for.
-//! - Aloft: along the axis until the tool is clear, straight over while the axis turns evenly, and down along the axis there;
-//!   all fed, since stock may stand.
-//! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in.
-//! - Around a sphere that holds the block, and is larger by the tool's greatest radius: with the tip on it every place of the
-//!   tool is outside of the block while its axis points away from the middle. Where an axis that turns evenly does not, it is
-//!   turned away first.
+//! - Aloft: along the axis until the tool is clear, straight over while the axis turns evenly, and down along
+//!   the axis there; all fed, since stock may stand.
+//! - Over the block that holds part and stock: out along the axis, straight over or over the top of the
+//!   block, and in.
+//! - Around a sphere that holds the block, and is larger by the tool's greatest radius: with the tip on it
+//!   every place of the tool is outside of the block while its axis points away from the middle. Where an
+//!   axis that turns evenly does not, it is turned away first.
 //!
-//! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
-//! block stock may stand: there the tool goes at the feed, and down its axis no faster than a plunge.
+//! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at
+//! rapid rate. In the block stock may stand: there the tool goes at the feed, and down its axis no faster
+//! than a plunge.
 //!
-//! The height aloft is the least at which the straight way stays clear of the part, on its outer side where there is no surface
-//! to meet.
+//! The height aloft is the least at which the straight way stays clear of the part, on its outer side where
+//! there is no surface to meet.
 //!
 //! - Around a greater sphere that holds the fixtures, too.
 //!
-//! A path begins and ends outside of all along the axis there, or where that meets a fixture, level beside it.
+//! A path begins and ends outside of all along the axis there, or where that meets a fixture, level beside
+//! it.
 //!
-//! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where nothing else
-//! is clear. Over the block the tool also rises over all fixtures where it meets one. Times are length over rate.
+//! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is
+//! taken where nothing else is clear. Over the block the tool also rises over all fixtures where it meets
+//! one. Times are length over rate.
 
 use super::bent::Bent;
 use crate::link::Speeds;
@@ -33,11 +37,12 @@ use part::Part;
 use std::f64::consts::TAU;
 use work::monitor::{Cancelled, Monitor};
 
-/// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
-/// off: `1/cos` of half of it.
+/// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as
+/// its chords cut off: `1/cos` of half of it.
 const SPHERE_STEP: f64 = 0.15;
 
-/// Distance that a cutter keeps from the part aloft, mm. Less may scratch where machines overshoot; more makes ways longer.
+/// Distance that a cutter keeps from the part aloft, mm. Less may scratch where machines overshoot; more
+/// makes ways longer.
 const ALOFT: f64 = 0.2;
 
 /// Halvings by which the height of a way aloft is told, of the last doubling.
@@ -196,8 +201,9 @@ impl<'a> Ways<'a> {
         Ok(best.2)
     }
 
-    /// The way from a place to where the tool stands outside of all, before its first pass or after its last: along its axis, or
-    /// where it meets something there, out of the block along its axis or aslant, and on level.
+    /// The way from a place to where the tool stands outside of all, before its first pass or after its last:
+    /// along its axis, or where it meets something there, out of the block along its axis or aslant, and on
+    /// level.
     pub fn away(&self, from: &ClPoint) -> Vec<ClPoint> {
         let along = [&self.sphere, &self.widest].map(|sphere| vec![sphere.exit(from, &from.axis)]);
         let to_side = |k: usize| {
@@ -306,7 +312,8 @@ impl<'a> Ways<'a> {
         Some(found)
     }
 
-    /// Whether what cuts runs on the outer side of the part all along, also beside its border, where no surface is met.
+    /// Whether what cuts runs on the outer side of the part all along, also beside its border, where no
+    /// surface is met.
     fn keeps_its_side(&self, moves: &[Leg]) -> bool {
         let outer = |at: &ClPoint| self.part.closest_point(&(at.tip + at.axis * self.middle)).1 >= 0.0;
         let (Some((a, _)), Some((b, _))) = (moves.first(), moves.last()) else { return true };
@@ -358,8 +365,8 @@ impl<'a> Ways<'a> {
         None
     }
 
-    /// Out along the axis, around the sphere in some way, and in along the axis there; and whether the tool is outside of the
-    /// block all around.
+    /// Out along the axis, around the sphere in some way, and in along the axis there; and whether the tool
+    /// is outside of the block all around.
     fn around(
         &self,
         sphere: &Sphere,
@@ -424,8 +431,8 @@ impl Sphere {
         ClPoint { tip: from.tip + toward * way.max(0.0), axis: from.axis }
     }
 
-    /// As [`Self::around_to`], with the axis turned away from the middle first and back last: clear of what the sphere holds
-    /// whatever the axes at both ends, which may be opposite, as on two sides of a blade.
+    /// As [`Self::around_to`], with the axis turned away from the middle first and back last: clear of what
+    /// the sphere holds whatever the axes at both ends, which may be opposite, as on two sides of a blade.
     fn around_pointing_away(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
         let away = |tip: Point3| ClPoint { tip, axis: (tip - self.centre).normalize() };
         let [a, b] = [away(from.tip), away(to.tip)];
@@ -433,7 +440,8 @@ impl Sphere {
         evenly(from, &a).into_iter().chain(between).chain(evenly(&b, to)).collect()
     }
 
-    /// The way from one place outside to another around the sphere, its end included, while the axis turns evenly.
+    /// The way from one place outside to another around the sphere, its end included, while the axis turns
+    /// evenly.
     fn around_to(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
         let [a, b] = [from, to].map(|at| (at.tip - self.centre).normalize());
         let angle = a.cross(&b).norm().atan2(a.dot(&b));
@@ -459,7 +467,8 @@ mod tests {
     use geometry::{AnalyticShape, AnalyticSurface};
     use part::Patch;
 
-    /// A bull nose with a wide holder, its tip on the sphere and on the chords around it, its axis square to the radius at most.
+    /// A bull nose with a wide holder, its tip on the sphere and on the chords around it, its axis square to
+    /// the radius at most.
     #[test]
     fn on_the_sphere_no_tool_that_points_away_touches_the_block() {
         let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-6.0, 14.0], [0.0, 9.0]]);

@@ -86,8 +86,8 @@ fn bounded_passes_keep_to_their_engagement() {
 /// Passes may be so much above their limit, degrees: their angle is looked at from place to place.
 const SLACK: f64 = 2.0;
 
-/// Stretches that are above it beyond that are no longer than this share of the radius: the ends of ways in corners, where the
-/// plan's loops become films.
+/// Stretches that are above it beyond that are no longer than this share of the radius: the ends of ways in
+/// corners, where the plan's loops become films.
 const TIP: f64 = 0.1;
 
 /// Stretches of passes on which the angle is above `limit`, rad: where each begins, and its length, mm.
@@ -126,7 +126,8 @@ fn acute_tips_keep_to_small_engagements() {
     assert!(!found.notes.iter().any(|note| note.contains("above the engagement")), "{:?}", found.notes);
 }
 
-/// A run along walls may begin right before a corner, as it does here: what is left of it is cut in layers all the same.
+/// A run along walls may begin right before a corner, as it does here: what is left of it is cut in layers
+/// all the same.
 #[test]
 fn corners_before_which_a_run_begins_keep_to_the_engagement() {
     let outline = points(&[
@@ -192,8 +193,9 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
     assert!(long.clone().all(|(at, _)| (left - 0.5..right + 0.5).contains(&at.x)), "{stretches:?}");
     let note = found.notes.iter().find(|n| n.contains("above the engagement")).unwrap();
     let told: f64 = note.split(' ').next().unwrap().parse().unwrap();
-    // Where the right room is cleared the slot ends when no more than the limit stands before it. Passes in that room come around
-    // the corners of the neck's mouth, by less than a millimetre, and so do those in the left one.
+    // Where the right room is cleared the slot ends when no more than the limit stands before it. Passes in
+    // that room come around the corners of the neck's mouth, by less than a millimetre, and so do those in
+    // the left one.
     let whole = right - left - 2.5 * (0.5 * (limit + SLACK.to_radians())).sin();
     assert!((whole - 1.0..whole + 0.5).contains(&above), "{above} {whole}");
     // What is told goes from one step of the way to another one, at both ends.
@@ -245,9 +247,10 @@ fn plan(pocket: &Pocket, diameter: f64, pattern: &Pattern, engagement: Option<f6
     plan_pocket(pocket, &Cutter::flat(diameter).unwrap(), &strategy, &settings, &Silent).unwrap()
 }
 
-/// Open sides and what a larger cutter left, with and without a bounded engagement: every place of the floor is cut or was clear
-/// before, no disc comes over a wall, the engagement is kept as measured in that stock, ways down are straight only where no
-/// stock stands, and there is no helix where the cutter may come from outside.
+/// Open sides and what a larger cutter left, with and without a bounded engagement: every place of the floor
+/// is cut or was clear before, no disc comes over a wall, the engagement is kept as measured in that stock,
+/// ways down are straight only where no stock stands, and there is no helix where the cutter may come from
+/// outside.
 #[test]
 fn open_pockets_and_rests_are_cleared_from_the_air() {
     let rectangle = || Region::nested(vec![points(&[(0., 0.), (40., 0.), (40., 24.), (0., 24.)])]).unwrap().0;
@@ -316,8 +319,8 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                     &Silent,
                 );
                 let above = above(&path, &arcs.unwrap(), (limit + SLACK).to_radians());
-                // Where the fronts from two open sides meet, one move may be above; jobs then plan again for less. Loops of a
-                // zigzag lean to one side, and in corners they become films.
+                // Where the fronts from two open sides meet, one move may be above; jobs then plan again for
+                // less. Loops of a zigzag lean to one side, and in corners they become films.
                 let longest = if matches!(pattern, Pattern::Zigzag { .. }) { TIP } else { 0.15 };
                 assert!(above.iter().all(|(_, length)| *length <= longest * radius), "{what}: {above:?}");
             }

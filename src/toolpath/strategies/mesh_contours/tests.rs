@@ -22,7 +22,8 @@ fn planned(part: &Part, cutter: &Cutter, step: Step, placing: LevelSteps) -> Res
     passes(&Task { part, cutter, settings, wants_mesh: true, pace, monitor: &Silent }, placing)
 }
 
-/// Triangles of blocks without undersides whose walls lean by an angle, rad; each by its middle and half its width at the top.
+/// Triangles of blocks without undersides whose walls lean by an angle, rad; each by its middle and half its
+/// width at the top.
 fn blocks(draft: f64, of: &[([f64; 2], f64)]) -> Part {
     let out = TOP * draft.tan();
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
@@ -49,8 +50,9 @@ fn cutters() -> [Cutter; 3] {
     [Cutter::ball(6.0), Cutter::bull(6.0, 1.0), Cutter::flat(6.0)].map(Result::unwrap)
 }
 
-/// On walls that lean by 0.1 to 50 degrees every pass is closed and level, touches the walls within the chord tolerance, and lies one
-/// strip from the next, as a plane of that slope allows; the lowest and the highest serve the wall to its ends.
+/// On walls that lean by 0.1 to 50 degrees every pass is closed and level, touches the walls within the chord
+/// tolerance, and lies one strip from the next, as a plane of that slope allows; the lowest and the highest
+/// serve the wall to its ends.
 #[test]
 fn walls_get_a_pass_a_strip_however_steep_they_are() {
     for draft in [0.1_f64, 1.0, 10.0, 50.0].map(f64::to_radians) {
@@ -89,7 +91,8 @@ fn walls_get_a_pass_a_strip_however_steep_they_are() {
     }
 }
 
-/// Where three strips are asked for, as many are there: a step along the surface is one of the height times the slope.
+/// Where three strips are asked for, as many are there: a step along the surface is one of the height times
+/// the slope.
 #[test]
 fn a_stepover_is_measured_along_the_wall() {
     let part = blocks(30_f64.to_radians(), &[([0.0; 2], 8.0)]);
@@ -102,7 +105,8 @@ fn a_stepover_is_measured_along_the_wall() {
     assert!(found.notes.iter().any(|note| note.contains("so level")), "{:?}", found.notes);
 }
 
-/// Between two blocks the cutter goes where it is narrower than the gap, to its bottom, and else no lower than it comes.
+/// Between two blocks the cutter goes where it is narrower than the gap, to its bottom, and else no lower
+/// than it comes.
 #[test]
 fn a_gap_is_entered_by_a_cutter_that_is_narrower() {
     let cutter = Cutter::ball(6.0).unwrap();

@@ -82,7 +82,8 @@ fn a_groove_has_a_pass_along_its_crease_and_passes_one_interval_apart_beside() {
             let distance = part.closest_point(&c).1;
             assert!((distance - RADIUS).abs() < SHORT, "{distance} at {c}");
         }
-        // Beyond the ends of the part the ball rolls about an axis along the side, so that any of its places will do.
+        // Beyond the ends of the part the ball rolls about an axis along the side, so that any of its places
+        // will do.
         offsets.extend(
             pass.first()
                 .map(|tip| tip + Vector3::z() * RADIUS)

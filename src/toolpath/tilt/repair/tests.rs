@@ -113,8 +113,8 @@ fn where_nothing_helps_the_tool_is_lifted_or_the_place_reported() {
         unreachable.iter().map(|u| u.place).collect::<Vec<_>>(),
         pass.iter().map(|t| t.contact.point).collect::<Vec<_>>()
     );
-    // The cone, 8 mm wide 30 mm above the tip and 12 mm wide at 45, is in the walls, 4 mm from its axis; the place that is
-    // as far from its slant as from its upper end is deepest.
+    // The cone, 8 mm wide 30 mm above the tip and 12 mm wide at 45, is in the walls, 4 mm from its axis; the
+    // place that is as far from its slant as from its upper end is deepest.
     let cos = 15.0 / 15f64.hypot(4.0);
     let deepest = 45.0 - (45.0 + cos * (30.0 * 4.0 / 15.0 - 4.0)) / (1.0 + cos * 4.0 / 15.0);
     assert!(
@@ -191,7 +191,8 @@ fn the_axis_is_led_over_to_where_it_must_lean() {
     assert!(fastest(Some(0.015)) < 0.0151, "{}", fastest(Some(0.015)));
 }
 
-/// Rules that turn fast beside a wall: led over to its neighbour's axis, none leans from its own by more than is allowed.
+/// Rules that turn fast beside a wall: led over to its neighbour's axis, none leans from its own by more than
+/// is allowed.
 #[test]
 fn no_axis_leans_from_its_rule_by_more_than_is_allowed() {
     let cutter = Cutter::ball(6.0).unwrap();

@@ -1,8 +1,9 @@
 //! Axes drawn together until no pair turns too fast.
 //!
-//! Pairs that turn too fast meet, one after the other (the projections of position based dynamics, M. Müller et al. 2007, on
-//! the unit sphere), first those far apart on a pass, then nearer ones. What sweeps leave is taken up by leaning all axes
-//! towards their mean: a constant axis turns nowhere, so that there is always a share of it that holds.
+//! Pairs that turn too fast meet, one after the other (the projections of position based dynamics, M. Müller
+//! et al. 2007, on the unit sphere), first those far apart on a pass, then nearer ones. What sweeps leave is
+//! taken up by leaning all axes towards their mean: a constant axis turns nowhere, so that there is always a
+//! share of it that holds.
 
 use super::graph::{Graph, Pair};
 use geometry::Vector3;
@@ -26,7 +27,8 @@ impl Pair {
         self.angle(axes) <= self.most + EXACT
     }
 
-    /// Turns the axes towards each other by what is too much, each by its share in it; those that are held stay.
+    /// Turns the axes towards each other by what is too much, each by its share in it; those that are held
+    /// stay.
     fn draw_together(&self, axes: &mut [Vector3], held: &[bool]) -> bool {
         if self.holds(axes) {
             return false;
@@ -50,8 +52,8 @@ impl Pair {
     }
 }
 
-/// Axes that turn no faster than the graph says, as near as may be to those that are wanted. Those that are held stay; where
-/// they are in the way of others, pairs with them may turn faster.
+/// Axes that turn no faster than the graph says, as near as may be to those that are wanted. Those that are
+/// held stay; where they are in the way of others, pairs with them may turn faster.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -103,8 +105,8 @@ fn sweep(
     Ok(())
 }
 
-/// Leans all that is free towards the mean of what is held, or of all, by the least share at which pairs hold. Pairs that do
-/// not even hold at the mean itself do not count.
+/// Leans all that is free towards the mean of what is held, or of all, by the least share at which pairs
+/// hold. Pairs that do not even hold at the mean itself do not count.
 fn lean_to_the_mean(pairs: &[Pair], axes: &mut Vec<Vector3>, held: &[bool]) {
     if pairs.iter().all(|pair| pair.holds(axes)) {
         return;

@@ -1,5 +1,5 @@
-//! Which contacts bound each other's axes, and by how much: neighbours on a pass, and a contact with the nearest place of each
-//! pass beside it.
+//! Which contacts bound each other's axes, and by how much: neighbours on a pass, and a contact with the
+//! nearest place of each pass beside it.
 
 use crate::moves::touch::Touch;
 use geometry::{Point3, Vector3};
@@ -49,8 +49,8 @@ impl Pair {
     }
 }
 
-/// The contacts of passes as nodes: contacts of a pass that lie in one place share a node, because between them no axis may
-/// turn.
+/// The contacts of passes as nodes: contacts of a pass that lie in one place share a node, because between
+/// them no axis may turn.
 pub(super) struct Graph {
     /// The touches of each node.
     pub touches: Vec<Range<usize>>,

@@ -1,12 +1,14 @@
 //! Axes that turn no faster than asked, along passes and from pass to pass.
 //!
-//! Enters: passes as touches of the cutter, and the greatest turn, rad a mm of contact. Leaves: the same contacts with axes
-//! that hold it, near to those that came; where nothing turns too fast they stay as they are.
+//! Enters: passes as touches of the cutter, and the greatest turn, rad a mm of contact. Leaves: the same
+//! contacts with axes that hold it, near to those that came; where nothing turns too fast they stay as they
+//! are.
 //!
-//! Limits are held first, without a look at what the tool must keep clear of ([`draw`]). Where it is not clear then, axes are
-//! held at the nearest one that is, and their neighbours come to them. Where limits cannot be held so, all lean towards one, as
-//! little as it takes; axes all around are tried for that. A constant axis that is clear everywhere is always found, unless all
-//! such axes lie within [`SPHERE`] of each other. Where nothing is clear, what turns too fast is noted.
+//! Limits are held first, without a look at what the tool must keep clear of ([`draw`]). Where it is not
+//! clear then, axes are held at the nearest one that is, and their neighbours come to them. Where limits
+//! cannot be held so, all lean towards one, as little as it takes; axes all around are tried for that. A
+//! constant axis that is clear everywhere is always found, unless all such axes lie within [`SPHERE`] of each
+//! other. Where nothing is clear, what turns too fast is noted.
 
 mod draw;
 mod graph;
@@ -23,7 +25,8 @@ use work::monitor::{self, Cancelled, Monitor};
 
 pub(crate) use graph::{LOST, TurningRates};
 
-/// Rounds in which axes that are not clear are held. Each holds more; what the last one leaves stays where it was.
+/// Rounds in which axes that are not clear are held. Each holds more; what the last one leaves stays where it
+/// was.
 const ROUNDS: usize = 6;
 
 /// A pair turns too fast when it does by more than this share: below are rounding and what moves take up.
@@ -32,8 +35,8 @@ const SLACK: f64 = 1e-3;
 /// Shares of the way to one axis for all.
 const LEANS: usize = 8;
 
-/// Axes that all may lean to are so far apart, rad: a clear cone of half that times √2, 4 degrees, holds one. Where only smaller ranges are
-/// clear none may be found.
+/// Axes that all may lean to are so far apart, rad: a clear cone of half that times √2, 4 degrees, holds one.
+/// Where only smaller ranges are clear none may be found.
 const SPHERE: f64 = 0.1;
 
 /// Steps towards the middle of all normals, which is off by the inverse of that, rad.
@@ -67,7 +70,8 @@ impl TooFast {
     }
 }
 
-/// Evens out the axes of passes. What the tool must keep away from may leave some that turn too fast ([`too_fast`]).
+/// Evens out the axes of passes. What the tool must keep away from may leave some that turn too fast
+/// ([`too_fast`]).
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -103,8 +107,8 @@ fn with_passes(passes: &[Vec<Touch>]) -> Vec<(usize, Touch)> {
     passes.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |touch| (k, *touch))).collect()
 }
 
-/// The direction whose greatest angle to all normals is about the least (M. Badoiu and K. L. Clarkson, "Smaller core-sets for
-/// balls", 2003).
+/// The direction whose greatest angle to all normals is about the least (M. Badoiu and K. L. Clarkson,
+/// "Smaller core-sets for balls", 2003).
 fn above_all(normals: &[Vector3]) -> Option<Vector3> {
     let mut middle = *normals.first()?;
     for k in 1..MIDDLES {
@@ -126,7 +130,8 @@ fn sphere() -> impl Iterator<Item = Vector3> {
     })
 }
 
-/// Many that may refuse what is tried. Those that did last are asked first: most tries are refused by few of them.
+/// Many that may refuse what is tried. Those that did last are asked first: most tries are refused by few of
+/// them.
 struct Refusals(Vec<u32>);
 
 impl Refusals {
@@ -197,7 +202,8 @@ impl<'a> Evening<'a> {
         Touch::along(axis, self.cutter, touch.contact, touch.feed)
     }
 
-    /// Whether the tool is clear at all touches of a node, with something to spare for the moves between them.
+    /// Whether the tool is clear at all touches of a node, with something to spare for the moves between
+    /// them.
     fn is_clear(&self, node: usize, axis: Vector3) -> bool {
         self.graph.touches[node].clone().all(|k| {
             let touch = &self.touches[k].1;
@@ -242,8 +248,9 @@ impl<'a> Evening<'a> {
         found.filter(nearer).unwrap_or(start)
     }
 
-    /// Axes that lean towards one and the same, as little as it takes to hold the limits, where the tool is clear so. Leaning
-    /// all the way is the constant axis. They lean from what was found, or from the normals, whose turns are those of the part.
+    /// Axes that lean towards one and the same, as little as it takes to hold the limits, where the tool is
+    /// clear so. Leaning all the way is the constant axis. They lean from what was found, or from the
+    /// normals, whose turns are those of the part.
     fn towards_one(
         &self,
         pairs: &[Pair],

@@ -63,7 +63,8 @@ fn what_holds_is_left_alone() {
 #[test]
 fn axes_that_must_lean_are_held_and_the_others_come_to_them() {
     let cutter = Cutter::ball(6.0).unwrap();
-    // Beside the last pass, and beside the first, stands a wall that overhangs: the tool must lean away from it.
+    // Beside the last pass, and beside the first, stands a wall that overhangs: the tool must lean away from
+    // it.
     let wall = |y: f64, over: f64| {
         let corner = |x: f64, z: f64| Point3::new(x, y + over * z, z);
         let vertices = vec![corner(-30.0, 0.0), corner(40.0, 0.0), corner(40.0, 12.0), corner(-30.0, 12.0)];
@@ -156,8 +157,8 @@ fn plans_turn_no_faster_than_asked() {
                     joining: joining[(p + r) % 2],
                     ..PlanSettings::default()
                 };
-                // In a hollow the flat of a bull nose may touch beside the contact that was planned: as a job does, such a path
-                // is planned for lower rates. All others hold at once.
+                // In a hollow the flat of a bull nose may touch beside the contact that was planned: as a job
+                // does, such a path is planned for lower rates. All others hold at once.
                 let at_once = cutter.is_ball() || p == 1;
                 let mut share = 0.99;
                 let (path, what) = loop {

@@ -46,8 +46,8 @@ fn is_near(result: &ToolpathResult, tool: &str, other: &str, expected: f64) {
     assert!((clearance - expected).abs() <= slack, "{tool} to {other}: {clearance} {expected} {found:?}");
 }
 
-/// Upright: the tip runs on the plate, so that the nose stands over it by the gauge length, and the tip over the table by what lies
-/// between plate and table.
+/// Upright: the tip runs on the plate, so that the nose stands over it by the gauge length, and the tip over
+/// the table by what lies between plate and table.
 #[test]
 fn a_table_and_a_nose_on_three_axes() {
     let home = Home::new("three");
@@ -113,7 +113,8 @@ fn tip() -> f64 {
     3.0 - 3.0 * LEAN.cos()
 }
 
-/// The nose leans over the table of a trunnion: its rim comes nearest, a gauge length up and half its diameter across.
+/// The nose leans over the table of a trunnion: its rim comes nearest, a gauge length up and half its
+/// diameter across.
 #[test]
 fn a_nose_over_a_table_that_turns() {
     let home = Home::new("trunnion");
@@ -141,7 +142,8 @@ fn a_nose_over_a_table_that_turns() {
     }
 }
 
-/// A ram that the head's axes do not turn hangs over the part: the pivot stands as far over the tip as the tool leans.
+/// A ram that the head's axes do not turn hangs over the part: the pivot stands as far over the tip as the
+/// tool leans.
 #[test]
 fn a_ram_over_a_part_and_a_head_that_turns() {
     let home = Home::new("ram");
@@ -172,7 +174,8 @@ fn a_ram_over_a_part_and_a_head_that_turns() {
     );
 }
 
-/// A program rises to the upper end of Z's travel: over a fixture by what is left of it, whether the path comes near it or not.
+/// A program rises to the upper end of Z's travel: over a fixture by what is left of it, whether the path
+/// comes near it or not.
 #[test]
 fn programs_rise_over_the_fixtures_or_violate() {
     let home = Home::new("rise");
@@ -188,8 +191,8 @@ fn programs_rise_over_the_fixtures_or_violate() {
     }
 }
 
-/// Over the block that the plate is cut from: the nose of three axes as far as the gauge length is longer than the block stands over
-/// the plate, a motor beside the spindle over what no pass comes to.
+/// Over the block that the plate is cut from: the nose of three axes as far as the gauge length is longer
+/// than the block stands over the plate, a motor beside the spindle over what no pass comes to.
 #[test]
 fn bodies_keep_off_the_stock() {
     let home = Home::new("stock");
@@ -216,7 +219,8 @@ fn bodies_keep_off_the_stock() {
     }
 }
 
-/// A pin above the cutter that would stand in the block if the cutter had not been there: nothing is proven, and nothing passes.
+/// A pin above the cutter that would stand in the block if the cutter had not been there: nothing is proven,
+/// and nothing passes.
 #[test]
 fn what_may_have_been_cut_is_open() {
     let home = Home::new("cut-before");
@@ -228,7 +232,8 @@ fn what_may_have_been_cut_is_open() {
     assert_eq!(of_pair(&result, "pin", "standing stock").verdict(), Verdict::Undecided);
 }
 
-/// The program of a planned path, read as one from elsewhere in both styles: bodies come as near to each other.
+/// The program of a planned path, read as one from elsewhere in both styles: bodies come as near to each
+/// other.
 #[test]
 fn programs_from_elsewhere_move_the_bodies() {
     let home = Home::new("foreign");
