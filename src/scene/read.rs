@@ -207,8 +207,10 @@ impl Scene {
     }
 }
 
+/// Keys of [cutter] beside its shape.
+const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
+
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
-    const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
     let cutter = Cutter::read(section, &SPEEDS)?;
     let rate =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
@@ -375,6 +377,10 @@ fn read_arcs(section: &Section<'_>, five_axis: bool, tolerance: &Limits) -> Resu
 }
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
+    if let Some(key) = SPEEDS.into_iter().find(|key| section.has(key)) {
+        let message = format!("the key `{key}` does not apply to [machine]");
+        return Err(section.error(&section.key_span(key), message, format!("write `{key}` in [cutter]")));
+    }
     let bodies = bodies::KEYS;
     section.only(
         &[

@@ -282,6 +282,9 @@ fn misspelt_words_are_answered_with_the_nearest_valid_one() {
     let (message, cure, _) = refused(&with("strategy = \"zigzag\"", "stratgy = \"zigzag\""));
     assert_eq!(message, "unknown key `stratgy` in [[toolpath]] number 1");
     assert!(cure.contains("`strategy`"), "{cure}");
+    let (message, cure, _) = refused(&with("[tolerance]", "[machine]\nfeed_rate = 900\n[tolerance]"));
+    assert_eq!(message, "the key `feed_rate` does not apply to [machine]");
+    assert_eq!(cure, "write `feed_rate` in [cutter]");
 }
 
 #[test]

@@ -65,7 +65,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let (machine, path) = (&five_axis.kinematics, run.path());
     let fastest = joints.fastest(machine, path, run.scene().machine.rapid_rate);
     let figures = MachineFigures::new(machine, &joints.report, fastest);
-    let mut claims = within_travel(machine, &joints.report.ranges, 0.0);
+    let mut claims = within_travel(machine, &joints.report.ranges, &joints.report.ranges);
     let notes: Vec<String> = note(&joints.report).into_iter().collect();
     let nose = joints.highest_nose(machine, path).max(over_the_work(run, machine, joints));
     claims.push(retract_above(machine.retracted_z(), nose));
@@ -83,8 +83,8 @@ fn of_program(five_axis: &FiveAxis, read: &ReadProgram) -> Finding {
         let note = "the travel of joints is not judged: cutter locations name no joints".to_owned();
         return Finding { notes: vec![note], ..Finding::default() };
     }
-    let (ranges, stray) = travelled(machine, read);
-    let mut claims = within_travel(machine, &ranges, stray);
+    let [found, most] = travelled(machine, read);
+    let mut claims = within_travel(machine, &found, &most);
     let unknown = read.joints.iter().find(|(tool, _)| !read.gauge_lengths.contains_key(tool));
     let cure = match unknown {
         _ if !five_axis.zero_is_given => Some("add `workpiece_zero` to [machine.kinematics]".to_owned()),
@@ -101,28 +101,33 @@ fn of_program(five_axis: &FiveAxis, read: &ReadProgram) -> Finding {
     Finding { claims, ..Finding::default() }
 }
 
-/// Least and greatest value of each joint, mm and rad, and by how much the linear ones may go farther, mm.
-fn travelled(machine: &Kinematics, read: &ReadProgram) -> ([[f64; 2]; 5], f64) {
-    let (mut ranges, mut stray) = ([[f64::INFINITY, f64::NEG_INFINITY]; 5], 0.0);
-    let mut widen = |k: usize, value: f64| {
-        ranges[k] = [ranges[k][0].min(value), ranges[k][1].max(value)];
+/// Least and greatest value of each joint, mm and rad.
+type Ranges = [[f64; 2]; 5];
+
+/// The ranges that are found, and those that no joint leaves. Places of the program are reached exactly; what lies between, where
+/// linear joints follow rotary ones, is known less closely.
+fn travelled(machine: &Kinematics, read: &ReadProgram) -> [Ranges; 2] {
+    let mut ranges = [[[f64::INFINITY, f64::NEG_INFINITY]; 5]; 2];
+    let mut widen = |k: usize, value: f64, stray: f64| {
+        for (range, off) in ranges.iter_mut().zip([0.0, stray]) {
+            range[k] = [range[k][0].min(value - off), range[k][1].max(value + off)];
+        }
     };
     for (tool, program) in &read.joints {
         let chain = Chain::of(&read.with_tool(machine, *tool));
         for (at, way) in program.iter().enumerate().skip(1) {
-            way.joints.linear.iter().enumerate().for_each(|(k, value)| widen(k, *value));
-            (0..2).for_each(|k| widen(k + 3, way.joints.rotary[k] + read.table_zero[k]));
+            way.joints.linear.iter().enumerate().for_each(|(k, value)| widen(k, *value, 0.0));
+            (0..2).for_each(|k| widen(k + 3, way.joints.rotary[k] + read.table_zero[k], 0.0));
             // Where rotary axes turn about a tip that is kept, the linear ones follow.
             if at > 1 && way.way == Way::Tip && way.joints.rotary != program[at - 1].joints.rotary {
-                stray = STRAY;
                 let links = [Link::Linear, Link::Frame];
                 let between = chain.motion(&program[at - 1..=at], links, &Point3::origin(), 0.0);
                 let noses = between.iter().map(|stretch| stretch.ends[1].translation.vector);
-                noses.for_each(|nose| nose.iter().enumerate().for_each(|(k, value)| widen(k, *value)));
+                noses.for_each(|nose| nose.iter().enumerate().for_each(|(k, value)| widen(k, *value, STRAY)));
             }
         }
     }
-    (ranges, stray)
+    ranges
 }
 
 /// How high the spindle nose has to stand, machine coordinates, mm, for the tip to be over part, stock and
@@ -159,25 +164,26 @@ fn retract_above(z: f64, nose: f64) -> Claim {
 const ROUNDING: f64 = 1e-6;
 
 /// That the joints keep to their travels: one claim for those of the linear and one for those of the rotary
-/// joints that are limited. The linear ones may go farther than found by `stray`, mm.
-fn within_travel(kinematics: &Kinematics, ranges: &[[f64; 2]; 5], stray: f64) -> Vec<Claim> {
-    let all = kinematics.letters().into_iter().zip(*ranges).zip(kinematics.limits()).enumerate();
-    let beyond = all.filter_map(|(k, ((joint, range), limits))| {
+/// joints that are limited, by the ranges that are `found` and the `most` that they may be.
+fn within_travel(kinematics: &Kinematics, found: &Ranges, most: &Ranges) -> Vec<Claim> {
+    let all = kinematics.letters().into_iter().zip(kinematics.limits()).enumerate();
+    let beyond = all.filter_map(|(k, (joint, limits))| {
         let [least, greatest] = limits?;
-        let over = (least - range[0]).max(range[1] - greatest);
-        Some((k < 3, joint, if k < 3 { over } else { over.to_degrees() }))
+        let over = [found, most].map(|ranges| (least - ranges[k][0]).max(ranges[k][1] - greatest));
+        Some((k < 3, joint, if k < 3 { over } else { over.map(f64::to_degrees) }))
     });
     let beyond: Vec<_> = beyond.collect();
     let worst = |linear: bool| {
-        let of = beyond.iter().filter(|(kind, ..)| *kind == linear);
-        let (_, joint, over) = of.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let of = || beyond.iter().filter(|(kind, ..)| *kind == linear);
+        let (_, joint, [over, _]) = of().max_by(|a, b| a.2[0].total_cmp(&b.2[0]))?;
+        let most = of().map(|joint| joint.2[1]).fold(*over, f64::max);
         let unit = if linear { "mm" } else { "degrees" };
         let text = if *over <= ROUNDING {
             format!("joint {joint} comes nearest to its limit, {:.3} {unit} inside of it", (-over).max(0.0))
         } else {
             format!("joint {joint} runs {over:.3} {unit} beyond its limit")
         };
-        let (unit, bound) = if linear { ("mm", stray) } else { ("deg", 0.0) };
+        let (unit, bound) = (if linear { "mm" } else { "deg" }, most - over);
         let claim = Claim::length("travel", Gravity::Crash, ROUNDING, *over, bound).told(text);
         let at_least = (bound > 0.0).then_some(*over);
         Some(Claim { unit, at_least, decided_by: "more travel would decide it", ..claim })
@@ -290,6 +296,22 @@ mod tests {
             assert_eq!(claim.verdict(), verdict, "{claim:?}");
             assert!((claim.measured.unwrap() - over).abs() <= claim.error_bound, "{claim:?}");
         }
+    }
+
+    /// A program that swings about its tip and rises to the very end of the travel is within it: places that it names are reached
+    /// exactly.
+    #[test]
+    fn the_end_of_the_travel_is_within_it() {
+        let swing = [[0.0, -320.0, 0.0], [0.0, -320.0, 5.0], [0.0, 0.0, 5.0]].map(|[x, z, b]| {
+            let joints = Joints { linear: Vector3::new(x, 0.0, z), rotary: [0.0, f64::to_radians(b)] };
+            Waypoint { joints, step: 0, way: Way::Tip, pace: Pace::default() }
+        });
+        let joints = through(Way::Tip, &[]).into_iter().chain(swing).collect::<Vec<_>>();
+        let machine = head("workpiece_zero = [0, 0, -400]\nz = [-500, 0]\n");
+        let passed = told(&machine, &program(vec![(1, joints.clone())]));
+        assert_eq!(passed[0].0, Verdict::Pass, "{passed:?}");
+        let machine = head("workpiece_zero = [0, 0, -400]\nz = [-500, -0.001]\n");
+        assert_eq!(told(&machine, &program(vec![(1, joints)]))[0].0, Verdict::Fail);
     }
 
     #[test]

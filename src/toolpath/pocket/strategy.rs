@@ -16,6 +16,7 @@ use cutter::Cutter;
 use field::mesh::Sense;
 use geometry::Vector2;
 use keys::{LENGTH, SceneError, Section, toml_number, word_of};
+use motion::ROUNDING;
 
 /// How a flow is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,6 +105,9 @@ const HELIX_OVER_RADIUS: f64 = 0.8;
 
 /// The least helix that is worth one, over the cutter's radius: a smaller one is a plunge.
 const LEAST_HELIX: f64 = 0.2;
+
+/// Greatest stepover over the cutter's diameter: a little less than what leaves nothing between straight passes.
+const MOST_STEPOVER: f64 = 0.95;
 
 /// Stepover over the cutter's diameter by default: 78 degrees of engagement.
 const STEPOVER_OVER_DIAMETER: f64 = 0.4;
@@ -261,9 +265,9 @@ pub fn read_pocket_step(section: &Section<'_>, cutter: &Cutter, scallop: f64) ->
     let (radius, corner) = (cutter.radius(), cutter.corner_radius());
     let low = cutter.flat_radius().max(0.0) + (scallop * (2.0 * corner - scallop)).max(0.0).sqrt();
     let step = match section.length("stepover")? {
-        Some(step) if step.value > 1.9 * radius => {
+        Some(step) if step.value > MOST_STEPOVER * 2.0 * radius + ROUNDING => {
             let message = format!(
-                "`stepover` is {} mm, more than 0.95 of the cutter's diameter of {} mm",
+                "`stepover` is {} mm, more than {MOST_STEPOVER} of the cutter's diameter of {} mm",
                 step.value,
                 2.0 * radius
             );
