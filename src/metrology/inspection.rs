@@ -321,8 +321,14 @@ impl Inspection<'_> {
         let mut regions = connected(&self.grid, &deep);
         regions.retain(|region| {
             let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { return false };
-            let (depth_mm, at, move_index) = self.deepest_near(deepest as usize);
-            // Beside a border a cut may count less deep than along the normal.
+            let mut found = self.deepest_near(deepest as usize);
+            if found.0 <= self.limits.gouge {
+                // Beside a border the deepest along its normal may count for less than others.
+                let counted = |k: &u32| self.depth_at(self.centre(*k as usize)).map_or(0.0, |found| found.0);
+                let next = region.iter().max_by(|a, b| counted(a).total_cmp(&counted(b)));
+                found = next.map_or(found, |&k| self.deepest_near(k as usize));
+            }
+            let (depth_mm, at, move_index) = found;
             if depth_mm <= self.limits.gouge {
                 return false;
             }
