@@ -71,7 +71,7 @@ impl Chosen {
         match self.cell {
             Some(Cell::Mm(cell)) => (scene.simulation.cell, scene.simulation.cell_is_auto) = (cell, false),
             Some(Cell::Auto) => {
-                scene.simulation.cell = auto_cell(&scene.cutter, &scene.toolpaths);
+                scene.simulation.cell = auto_cell(&scene.toolpaths);
                 scene.simulation.cell_is_auto = true;
             }
             None => {}

@@ -149,6 +149,31 @@ impl Cutter {
     }
 }
 
+impl Cutter {
+    /// The cutter pushed outward by a distance on all sides, mm, and how far its tip lies below that of this
+    /// one: along the path on which it touches a part this one keeps so far away everywhere. Edges stay edges,
+    /// so that a pointed one keeps a little farther.
+    ///
+    /// # Errors
+    /// [`AptError`] where it grows beyond the size of cutters.
+    pub fn grown(&self, distance: f64) -> Result<(Self, f64), AptError> {
+        let words = *self.words();
+        let (bottom, side) = (Incline::from_plane(words.tip_angle), Incline::from_axis(words.side_angle));
+        let below = distance / bottom.cos;
+        // The side moves out, and is measured at the level of the lower tip.
+        let foot = words.foot() + (distance - below * side.cos) / side.sin;
+        let share = 1.0 - words.tip_angle.tan() * words.side_angle.tan();
+        let grown = AptWords {
+            diameter: 2.0 * foot / share,
+            corner_radius: words.corner_radius + distance,
+            corner_z: words.corner_z + below,
+            length: words.length + below,
+            ..words
+        };
+        Ok((Self::apt(&grown)?, below))
+    }
+}
+
 /// The cure for a corner that is out of place.
 fn touching(word: AptWord, [e, f]: [f64; 2]) -> String {
     let value = if word == AptWord::CornerX { e } else { f };
@@ -215,6 +240,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Rolled around the cutter, a ball of the distance lies in the grown one and reaches its surface, except
+    /// around edges and points.
+    #[test]
+    fn a_grown_cutter_is_this_one_with_a_ball_around_it() {
+        let named = [Cutter::ball(6.0).unwrap(), Cutter::flat(6.0).unwrap(), Cutter::bull(6.0, 1.3).unwrap()];
+        let taper = Cutter::taper(2.0, 0.4, 20f64.to_radians(), 6.0).unwrap();
+        let words = AptWords::examples().into_iter().map(|words| Cutter::apt(&words).unwrap());
+        for (k, cutter) in named.into_iter().chain([taper]).chain(words).enumerate() {
+            let (grown, below) = cutter.grown(0.4).unwrap();
+            let profile = cutter.profile().grown(0.4);
+            assert!(grown.radius() >= profile.radius - 1e-9);
+            for j in 0..=500 {
+                let rho = profile.radius * f64::from(j) / 500.0 * (1.0 - 1e-9);
+                let (got, expected) = (grown.height(rho).unwrap() - below, profile.height(rho));
+                assert!((got - expected).abs() < 1e-7, "{k} {cutter:?} at {rho}: {got} {expected}");
+            }
+        }
+        let (ball, below) = Cutter::ball(6.0).unwrap().grown(0.3).unwrap();
+        assert!(ball.is_ball() && below == 0.3 && (ball.radius() - 3.3).abs() < 1e-12);
     }
 
     #[test]

@@ -143,7 +143,7 @@ impl Standing {
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
         let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0, unreached: 0.0 };
-        Some(standing.on_faces(&planned.plan.kept.faces, wanted))
+        Some(standing.served(&planned.plan.kept.faces, wanted))
     }
 
     /// Where cells see no ridge, of what stands along borders alone.
@@ -173,17 +173,23 @@ impl Standing {
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
         let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
         let unreached = measured.excess.unreached.at_least_mm;
-        Self { round, above, depth, unreached }.on_faces(&planned.plan.kept.faces, wanted)
+        Self { round, above, depth, unreached }.served(&planned.plan.kept.faces, wanted)
     }
 
     /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once
-    /// those are cut.
-    fn on_faces(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
-        if *faces == Faces::ALL {
+    /// those are cut. What stands high is left to a toolpath behind that is for the rest.
+    fn served(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
+        if *faces == Faces::ALL && wanted.highest == f64::INFINITY {
             return self;
         }
         let mesh = wanted.part.mesh();
-        self.above.retain(|(at, _)| {
+        self.above.retain(|(at, height)| {
+            if *height > wanted.highest {
+                return false;
+            }
+            if *faces == Faces::ALL {
+                return true;
+            }
             let foot = wanted.part.closest_point(at).0;
             let around = mesh.triangles_at(foot.triangle as usize, &foot.point);
             let mut held = around.into_iter().map(|t| faces.hold(&mesh.normal(t)));
@@ -208,6 +214,8 @@ struct Wanted<'a> {
     part: &'a Part,
     /// What no ridge may exceed, mm.
     target: f64,
+    /// What stands higher is a matter of another toolpath, mm.
+    highest: f64,
     /// Whether what others left is all that is cut.
     behind_others: bool,
 }
@@ -285,8 +293,9 @@ impl Session {
         };
         let first = self.plan(request, around, None, monitor)?;
         let map = match target {
-            Some(_) => self.ridges(request, engine, &first, monitor)?,
-            None => None,
+            // Between its stretches stands what others left: its moves alone do not tell how high.
+            Some(_) if !request.is_for_places() => self.ridges(request, engine, &first, monitor)?,
+            _ => None,
         };
         let closeness = target.map_or(Closeness::Verdict, |target| Closeness::Plan {
             within: SLACK * target,
@@ -295,7 +304,7 @@ impl Session {
         let whole = |planned: &Planned, closeness| {
             self.look(request, earlier, engine, &planned.plan.path, closeness, monitor)
         };
-        let wanted = |target: f64, behind_others: bool| Wanted { part: &self.part, target, behind_others };
+        let wanted = |target, behind_others| self.wanted(request, target, behind_others);
         let of_ridges = |(map, target)| Standing::of_ridges(map, &first, [1.0; 2], wanted(target, false));
         let (looked, standing) = match map.as_ref().zip(target).and_then(of_ridges) {
             Some(standing) => (None, Some(standing)),
@@ -318,7 +327,7 @@ impl Session {
             };
             return Ok((first, measured, covered));
         };
-        let interval = plane_interval(&self.scene.cutter, request.step);
+        let interval = plane_interval(&request.tooling.cutter, request.step);
         let widths = Widths::by_calculation(interval);
         let rounds = vec![standing.round];
         let tried = Tried { widths, standing, kept: first.plan.kept.clone() };
@@ -352,6 +361,21 @@ impl Session {
         Ok((best, measured, covered))
     }
 
+    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to
+    /// leave it as well, with what arcs may lead the tool astray.
+    fn room(&self, request: &ToolpathRequest) -> f64 {
+        let (tolerance, strays) = (&self.scene.tolerance, self.scene.arcs.unwrap_or(0.0));
+        let (chord, is_smoothed) = (tolerance.chord, request.joining.smoothing);
+        let unused = unused_tolerance(chord, is_smoothed);
+        unused.min(tolerance.gouge - (chord - unused) - strays)
+    }
+
+    fn wanted(&self, request: &ToolpathRequest, target: f64, behind_others: bool) -> Wanted<'_> {
+        // A toolpath for the rest takes what deeper moves do not: what no path of this cutter reaches most of all.
+        let highest = if self.rest_follows(request) { target + self.room(request) } else { f64::INFINITY };
+        Wanted { part: &self.part, target, highest, behind_others }
+    }
+
     /// Measures the whole surface that a path leaves behind `earlier` ones, where no cell sees as well unless
     /// the rest fails for certain.
     pub(crate) fn look(
@@ -364,13 +388,13 @@ impl Session {
         monitor: &dyn Monitor,
     ) -> Result<Looked, JobError> {
         let (cutters, holders) = self.tools(request);
-        let whole = WholePath::new(earlier, path, cutters, self.scene.machine.rapid_rate);
+        let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
         let all = (&*whole.path, &whole.cutters);
         let MeasuredClosely { measured, is_as_verdict } =
             self.measure_closely(request, engine, all, closeness, monitor)?;
         let covered = match self.pocket {
             None if self.verdict_on(&measured) != Verdict::Fail => {
-                let own = ToolMoves::of(cutters, holders, path);
+                let own = ToolMoves::of(&cutters, &holders, path);
                 Some(self.covered(request, &measured, all, &whole.tools(earlier, &own), monitor)?)
             }
             _ => None,
@@ -399,11 +423,12 @@ impl Session {
         of_task: impl FnOnce(&Task<'_>) -> Result<T, EngineError>,
     ) -> Result<T, JobError> {
         let scene = &self.scene;
-        let cell = plane_interval(&scene.cutter, request.step) / CELLS_A_PASS;
+        let cell = plane_interval(&request.tooling.cutter, request.step) / CELLS_A_PASS;
         let simulation = Simulation { cell, cell_is_auto: true, ..scene.simulation };
         let cells =
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;
-        let task = self.task(&planned.plan.path, &simulation, &cells);
+        let (cutters, _) = self.tools(request);
+        let task = self.task(request, (&planned.plan.path, &cutters), &simulation, &cells);
         of_task(&task).map_err(|reason| JobError::engine(scene, &request.name, reason))
     }
 
@@ -436,7 +461,7 @@ impl Session {
 impl Corrected<'_> {
     fn wanted(&self, measured: bool) -> Wanted<'_> {
         let behind_others = measured && !self.earlier.is_empty();
-        Wanted { part: &self.session.part, target: self.goal.target, behind_others }
+        self.session.wanted(self.request, self.goal.target, behind_others)
     }
 
     /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the
@@ -552,7 +577,7 @@ impl Corrected<'_> {
         let Some((at, _)) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit) else {
             return Ok(false);
         };
-        let cutter = &self.session.scene.cutter;
+        let cutter = &self.request.tooling.cutter;
         let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, &[(*at, limit)], monitor)?;
         Ok(self.leaves_nearly(left))
     }
@@ -563,7 +588,7 @@ impl Corrected<'_> {
             return Ok(false);
         }
         let (session, path) = (self.session, &self.best.plan.path);
-        let cutter = &session.scene.cutter;
+        let cutter = &self.request.tooling.cutter;
         let left = LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?;
         Ok(self.leaves_nearly(left))
     }
@@ -604,6 +629,11 @@ impl Corrected<'_> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
         if self.is_far_off() {
             return self.far_off_served(in_vain);
+        }
+        if self.session.rest_follows(self.request) {
+            let near = self.standing_near(&self.tried);
+            let may_help = in_vain == 0 && !round.holds(&self.goal);
+            return may_help.then(|| self.lowered(&self.tried.widths, &near)).flatten();
         }
         let last = self.latest.as_ref().unwrap_or(&self.tried);
         let in_proportion = || {
@@ -731,14 +761,9 @@ impl Corrected<'_> {
         Some(widths.narrowed(&high))
     }
 
-    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to
-    /// leave it as well, with what arcs may lead the tool astray.
+    /// How much deeper moves may go, mm.
     fn room(&self) -> f64 {
-        let scene = &self.session.scene;
-        let (tolerance, strays) = (&scene.tolerance, scene.arcs.unwrap_or(0.0));
-        let (chord, is_smoothed) = (tolerance.chord, self.request.joining.smoothing);
-        let unused = unused_tolerance(chord, is_smoothed);
-        unused.min(tolerance.gouge - (chord - unused) - strays)
+        self.session.room(self.request)
     }
 
     /// Widths with deeper moves beside the places where that is enough; `None` without such places.
@@ -788,7 +813,7 @@ impl Corrected<'_> {
 
     /// The places of a plan that come near the target.
     fn standing_near(&self, Tried { standing, widths, .. }: &Tried) -> Vec<HighPlace> {
-        let cutter = &self.session.scene.cutter;
+        let cutter = &self.request.tooling.cutter;
         let target = self.goal.target;
         let margin = standing.round.margin(target);
         let places = standing.above.iter().map(|&(at, height)| {

@@ -69,7 +69,7 @@ impl Session {
         monitor: &dyn Monitor,
     ) -> Result<Covered, JobError> {
         let (scene, part) = (&self.scene, &self.part);
-        let own = self.task(path, &scene.simulation, &self.cells);
+        let own = self.task(request, (path, cutters), &scene.simulation, &self.cells);
         let facing = own.facing();
         let View::Heights(cut) = &measured.view else {
             let areas = Coverage::new(part, &facing, scene.judged, None).figures();

@@ -5,9 +5,15 @@
 //! before it left.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use cutter::{Cutter, Holder};
+use geometry::Point2;
+use metrology::View;
 use motion::{Cutters, PathsInTurn, Toolpath};
+use scene::Scene;
+use sim::ZMap;
+use toolpath::Rest;
 
 use super::Outcome;
 use super::tool::ToolMoves;
@@ -23,14 +29,30 @@ pub(crate) struct EarlierPath {
     pub cutters: Cutters,
     /// What held each of them.
     pub holders: Vec<Option<Holder>>,
+    /// Where it and those before it left more than ridges may be.
+    pub left: Arc<Rest>,
 }
 
 impl EarlierPath {
     /// What a toolpath left.
-    pub fn of(outcome: &Outcome) -> Self {
-        let Outcome { result, path, cutters, holders, .. } = outcome;
-        let name = result.name.clone();
-        Self { name, path: path.clone(), cutters: cutters.clone(), holders: holders.clone() }
+    pub fn of(outcome: &Outcome, scene: &Scene) -> Self {
+        let Outcome { result, path, cutters, holders, measurement, view, .. } = outcome;
+        let left = match view {
+            View::Heights(ZMap { grid, .. }) => {
+                let above = |deviation: &f32| f64::from(*deviation) > scene.tolerance.scallop;
+                let stands = measurement.deviation_map.iter().map(above).collect();
+                Rest::new(grid.origin, grid.cell, [grid.nx, grid.ny], stands)
+            }
+            // No toolpath goes on behind these.
+            View::Normals(_) => Rest::new(Point2::origin(), 1.0, [0; 2], Vec::new()),
+        };
+        Self {
+            name: result.name.clone(),
+            path: path.clone(),
+            cutters: cutters.clone(),
+            holders: holders.clone(),
+            left: Arc::new(left),
+        }
     }
 
     /// Its moves by cutter.

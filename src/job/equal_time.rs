@@ -82,7 +82,7 @@ impl Session {
         around: Around<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(ToolpathRequest, Planned), JobError> {
-        let (scene, cutter) = (&self.scene, &self.scene.cutter);
+        let (scene, cutter) = (&self.scene, &request.tooling.cutter);
         let at = |scallop| ToolpathRequest { step: Step::Scallop(scallop), ..request.clone() };
         let corner = cutter.corner_radius();
         let highest = HIGHEST * if corner > 0.0 { corner } else { cutter.radius() };

@@ -4,7 +4,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use io::digest;
-use metrology::{Engine, Measured};
+use metrology::{Engine, Measured, Measurement, ScallopFigures};
 use motion::Toolpath;
 use report::{
     Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
@@ -60,7 +60,7 @@ impl Session {
                     note_same_path(&mut seen, &mut outcome);
                     done(&outcome)?;
                     if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
-                        earlier.push(EarlierPath::of(&outcome));
+                        earlier.push(EarlierPath::of(&outcome, &self.scene));
                     }
                     if request.stock_is_previous {
                         answers_later(rows.last_mut(), &left, &request.name);
@@ -109,15 +109,9 @@ impl Session {
         let mut earlier = Vec::new();
         for before in all[first..own].iter().filter(|_| request.stock_is_previous) {
             let outcome = self.toolpath_after(&earlier, before, monitor)?;
-            earlier.push(EarlierPath::of(&outcome));
+            earlier.push(EarlierPath::of(&outcome, &self.scene));
         }
         self.toolpath_after(&earlier, request, monitor)
-    }
-
-    /// Whether the next toolpath cuts what this one leaves.
-    fn goes_on(&self, request: &ToolpathRequest) -> bool {
-        let mut after = self.scene.toolpaths.iter().skip_while(|other| other.name != request.name).skip(1);
-        after.next().is_some_and(|next| next.stock_is_previous)
     }
 
     /// As [`Session::toolpath`], behind the toolpaths that cut the same stock.
@@ -130,11 +124,12 @@ impl Session {
         monitor::check(monitor)?;
         let engine = self.engine(request)?;
         self.refuse_unmeasured(request, earlier, engine)?;
-        let tool = Tool::of(&self.scene);
+        let tool = Tool::of(&request.tooling);
         let fixtures = self.fixtures(monitor)?;
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
-        let around = Around { tool: &tool, near, fixtures: &fixtures };
+        let rest = earlier.last().filter(|_| request.rest).map(|before| &before.left);
+        let around = Around { tool: &tool, near, fixtures: &fixtures, rest };
         let at_time;
         let (request, planned, mut measured, covered) = match &request.equal_time {
             None => {
@@ -153,14 +148,14 @@ impl Session {
         };
         let (cutters, holders) = self.tools(request);
         let path = &planned.plan.path;
-        let whole = WholePath::new(earlier, path, cutters, self.scene.machine.rapid_rate);
+        let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
         // The programs are as far off the moves that were measured.
         let strays = whole.path.origin.strays;
         measured.measurement.widen(strays);
-        let tools = ToolMoves::of(cutters, holders, path);
+        let tools = ToolMoves::of(&cutters, &holders, path);
         let mut covered = match (covered, &self.pocket) {
             (Some(known), _) => known,
-            (None, Some(pocket)) => self.pocket_covered(pocket, cutters),
+            (None, Some(pocket)) => self.pocket_covered(pocket, &cutters),
             (None, None) => {
                 monitor.start("measuring the coverage", 0);
                 let all = (&*whole.path, &whole.cutters);
@@ -174,7 +169,7 @@ impl Session {
             &mut measured.measurement.gouge.regions,
             &whole,
             earlier,
-            OwnMoves { path, cutters },
+            OwnMoves { path, cutters: &cutters },
         );
         let run = Run {
             session: self,
@@ -185,7 +180,7 @@ impl Session {
             around,
             whole: &whole,
             earlier,
-            own_cutters: cutters,
+            own_cutters: &cutters,
             tools: &tools,
         };
         let found = figures::all(&run, monitor)?;
@@ -202,7 +197,7 @@ impl Session {
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
             path: planned.path_figures(&self.scene, monitor)?,
-            scallop: measurement.scallop.clone(),
+            scallop: self.scallop_figures(request, measurement),
             gouge: unseen
                 .map_or_else(|| measurement.gouge.clone(), |unseen| measurement.gouge.or(&unseen.gouge)),
             uncut: measurement.uncut.clone(),
@@ -212,14 +207,14 @@ impl Session {
             simulation: self.simulation_figures(engine, &measured, path),
             surface_mesh: machined.figures(),
         };
-        let Planned { plan, joints, rise_to, .. } = planned;
+        let Planned { plan, joints, header, .. } = planned;
         Ok(Outcome {
             result,
             path: plan.path,
-            cutters: cutters.clone(),
-            holders: holders.to_vec(),
+            cutters,
+            holders,
             joints,
-            rise_to,
+            header,
             field: plan.field,
             measurement: measured.measurement,
             view: measured.view,
@@ -242,6 +237,20 @@ impl Session {
             [figures::with_other_tools(claims), Vec::new()]
         } else {
             [claims, Vec::new()]
+        }
+    }
+
+    /// The figures of ridges; none is held against the target where another toolpath cuts them off.
+    fn scallop_figures(&self, request: &ToolpathRequest, measurement: &Measurement) -> ScallopFigures {
+        let scallop = measurement.scallop.clone();
+        match self.leaves_the_rest(request) {
+            true => ScallopFigures {
+                target_mm: self.scene.tolerance.scallop,
+                over_target_fraction: None,
+                reason: scallop.reason.or(Some("the next toolpath cuts these ridges off".into())),
+                ..scallop
+            },
+            false => scallop,
         }
     }
 

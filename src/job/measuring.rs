@@ -68,10 +68,10 @@ impl Session {
         let own = self.own_cells(request)?;
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
-        let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
+        let mut finest = auto_cell(&scene.toolpaths).min(simulation.cell);
         // Cells up to twice as wide as suits the scene show every pass.
         let is_first_look = engine.gains_by_cells() && FINER * cells.0.cell > finest;
-        let first = Task { cutters, is_first_look, ..self.task(path, simulation, cells) };
+        let first = Task { is_first_look, ..self.task(request, (path, cutters), simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         if !engine.gains_by_cells() {
@@ -90,7 +90,7 @@ impl Session {
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
             let finer = cells.map(|cells| {
-                let task = Task { cutters, ..self.task(path, &simulation, &cells) };
+                let task = self.task(request, (path, cutters), &simulation, &cells);
                 engine.measure(&task, monitor)
             });
             match finer {
@@ -112,7 +112,7 @@ impl Session {
     /// scene's scallop height.
     fn own_cells(&self, request: &ToolpathRequest) -> Result<Option<(Simulation, LaidOut)>, JobError> {
         let scene = &self.scene;
-        let cell = auto_cell(&scene.cutter, std::slice::from_ref(request));
+        let cell = auto_cell(std::slice::from_ref(request));
         if request.equal_time.is_none() || !scene.simulation.cell_is_auto || cell >= scene.simulation.cell {
             return Ok(None);
         }

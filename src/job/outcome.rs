@@ -26,8 +26,8 @@ pub struct Outcome {
     pub holders: Vec<Option<Holder>>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
-    /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
-    pub rise_to: Option<f64>,
+    /// What its programs say before the first move.
+    pub header: ProgramHeader,
     /// What a streamline was planned by.
     pub field: Option<Arc<PlannedField>>,
     /// The figures with their maps and samples.
@@ -49,8 +49,8 @@ impl Session {
     /// # Errors
     /// Those of `out`.
     pub fn write_program(&self, out: &mut dyn std::io::Write, outcome: &Outcome) -> std::io::Result<()> {
-        let header = ProgramHeader { rise_to: outcome.rise_to, ..self.header(&outcome.result.name) };
-        write_program(out, &self.scene, &outcome.path, outcome.joints.as_ref(), &header).map(drop)
+        let Outcome { cutters, path, joints, header, .. } = outcome;
+        write_program(out, &self.scene, (path, cutters.first()), joints.as_ref(), header).map(drop)
     }
 
     /// Whether an outcome has a program.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cutter::Solid;
+use cutter::Cutter;
 use io::ProgramHeader;
 use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
 use machine::kinematics::{Following, JointPath, Kinematics, Waypoint, follow};
@@ -15,9 +15,9 @@ use metrology::{
     fastest_turn_across, path_figures,
 };
 use motion::{Move, MoveKind, Toolpath};
-use scene::{AxisRequest, FiveAxis, Scene, ToolpathRequest};
+use scene::{AxisRequest, FiveAxis, Scene, Tooling, ToolpathRequest};
 use toolpath::{
-    Detour, Earlier, Engagement, Exceeding, ForeignProgram, Gentle, OffsetDrive, OffsetSurface, Plan,
+    Detour, Earlier, Engagement, Exceeding, ForeignProgram, Gentle, OffsetDrive, OffsetSurface, Places, Plan,
     PlanError, PlanSettings, PocketStrategy, ReadProgram, Step, Strategy, Tilting, around_fixtures,
     engagement, plan, plan_pocket, plan_tilted,
 };
@@ -45,8 +45,8 @@ pub(crate) struct Planned {
     pub strategy: Box<dyn Strategy>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
-    /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
-    pub rise_to: Option<f64>,
+    /// What its programs say before the first move.
+    pub header: ProgramHeader,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
     /// The same with thinner layers counted, where an engagement was asked for.
@@ -121,20 +121,22 @@ impl Session {
                 plan,
                 strategy,
                 joints: None,
-                rise_to: None,
+                header: self.header(request, None),
                 engaged: None,
                 engaged_thinly: None,
                 correction: None,
                 equal_time: None,
             });
         }
-        let settings = PlanSettings { earlier, ..self.settings(request) };
+        let places = Places { boundary: request.boundary.clone(), rest: around.rest.cloned() };
+        let settings = PlanSettings { earlier, places, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
             let pocket = strategy.downcast_ref::<PocketStrategy>();
             let bounded = pocket.is_some_and(|strategy| strategy.engagement.is_some());
-            let (path, left_out) = self.as_written(&plan.path, if bounded { BOUNDED_STRAYING } else { 1.0 });
+            let (path, left_out) =
+                self.as_written(request, &plan.path, if bounded { BOUNDED_STRAYING } else { 1.0 });
             plan.path = path;
             if left_out > 0 {
                 let moves = if left_out == 1 { "move" } else { "moves" };
@@ -147,17 +149,18 @@ impl Session {
             Ok::<_, JobError>((plan, engaged))
         };
         let (mut plan, engaged) =
-            within_engagement(planned(&*strategy)?, &*strategy, scene.cutter.radius(), &planned)?;
+            within_engagement(planned(&*strategy)?, &*strategy, request.tooling.cutter.radius(), &planned)?;
         let engaged_thinly = self.engaged_thinly(request, &plan.path, monitor)?;
-        let joints = joints(scene, &request.name, &plan.path)?;
+        let joints = joints(scene, request, around.tool, &plan.path)?;
         if scene.machine.slow_corners {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
             plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()), monitor)?;
         }
         let tops = around.fixtures.iter().map(|(mesh, _)| mesh.bounds().max.z + scene.clearance);
         let rise_to = tops.reduce(f64::max);
-        let header = ProgramHeader { rise_to, ..header(scene, "") };
-        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
+        let header = self.header(request, rise_to);
+        plan.path.origin.lines =
+            lines(scene, (&plan.path, &request.tooling.cutter), joints.as_ref(), &header)?;
         plan.path.origin.strays = scene.arcs.unwrap_or(0.0);
         if let Some(JointPath { strays: [tip, axis], .. }) = joints {
             plan.path.origin.strays += tip + axis * around.tool.cutter.reach();
@@ -167,7 +170,7 @@ impl Session {
             plan,
             strategy,
             joints,
-            rise_to,
+            header,
             engaged,
             engaged_thinly,
             correction: None,
@@ -183,7 +186,7 @@ impl Session {
         around: Around<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Plan, PlanError> {
-        let cutter = &self.scene.cutter;
+        let cutter = &request.tooling.cutter;
         let pocket = self.pocket.as_ref().zip(strategy.downcast_ref::<PocketStrategy>());
         let plan = match (pocket, &request.axis) {
             (Some((pocket, strategy)), _) => plan_pocket(pocket, cutter, strategy, settings, monitor)?,
@@ -199,7 +202,7 @@ impl Session {
                     };
                     plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor)
                 };
-                let turns = |plan: &Plan| self.turning(axis, plan, monitor);
+                let turns = |plan: &Plan| self.turning(request, axis, plan, monitor);
                 return within_turning(&planned, &turns);
             }
         };
@@ -212,18 +215,25 @@ impl Session {
     /// A path as programs say it, which is what is cut and measured: without moves shorter than the control
     /// takes (merged within a share of the chord tolerance), slowed in corners, rounded; and how many moves
     /// are left out.
-    fn as_written(&self, path: &Toolpath, share: f64) -> (Toolpath, usize) {
+    fn as_written(&self, request: &ToolpathRequest, path: &Toolpath, share: f64) -> (Toolpath, usize) {
         let Scene { tolerance, machine, .. } = &self.scene;
-        let straying = Straying { tolerance: tolerance.chord * share, length: cutting_length(&self.scene) };
+        let straying =
+            Straying { tolerance: tolerance.chord * share, length: cutting_length(&request.tooling) };
         let (merged, left_out) = merge_short_moves(path, machine, &straying);
         let slowed = if machine.slow_corners { slow_corners(&merged, machine) } else { merged };
         (slowed.as_written(), left_out)
     }
 
     /// The fastest turns of a plan as programs have it, times what is allowed.
-    fn turning(&self, axis: &AxisRequest, plan: &Plan, monitor: &dyn Monitor) -> Result<f64, PlanError> {
-        let (part, cutter) = (&self.part, &self.scene.cutter);
-        let path = self.as_written(&plan.path, 1.0).0;
+    fn turning(
+        &self,
+        request: &ToolpathRequest,
+        axis: &AxisRequest,
+        plan: &Plan,
+        monitor: &dyn Monitor,
+    ) -> Result<f64, PlanError> {
+        let (part, cutter) = (&self.part, &request.tooling.cutter);
+        let path = self.as_written(request, &plan.path, 1.0).0;
         let share = |found: Option<FastestTurn>, limit: f64| found.map_or(0.0, |turn| turn.rate / limit);
         let along = axis.most_turning.map_or(Ok(0.0), |limit| {
             fastest_turn(part, cutter, &path, monitor).map(|found| share(found, limit))
@@ -242,8 +252,11 @@ impl Session {
             stock_top: self.top(),
             stock: Some(self.area()),
             may_enter_beside: self.scene.stock_is_stated && self.scene.keep_clear.fixtures.is_empty(),
-            feed_rate: self.scene.cutting.feed_rate,
-            plunge_rate: self.scene.cutting.plunge_rate,
+            feed_rate: request.tooling.cutting.feed_rate,
+            plunge_rate: request.tooling.cutting.plunge_rate,
+            stepdown: request.stepdown,
+            allowance: request.allowance,
+            places: Places::default(),
             machine: self.scene.machine,
             joining: request.joining,
             faces: request.faces(),
@@ -256,7 +269,11 @@ impl Session {
     /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool
     /// astray, or arcs an upright one.
     pub(crate) fn aimed_at(&self, request: &ToolpathRequest) -> Step {
-        let strays = if request.tilts() { may_stray(&self.scene) } else { self.scene.arcs.unwrap_or(0.0) };
+        let strays = if request.tilts() {
+            may_stray(&self.scene, &Tool::of(&request.tooling))
+        } else {
+            self.scene.arcs.unwrap_or(0.0)
+        };
         match request.step {
             Step::Scallop(height) => Step::Scallop((height - strays).max(LEAST_AIM * height)),
             step => step,
@@ -269,7 +286,7 @@ impl Session {
         let (Some(OffsetSurface { along, drive }), Some(blade)) = (asked, &self.blade) else {
             return Ok(request.strategy.clone());
         };
-        let radius = self.scene.cutter.radius();
+        let radius = request.tooling.cutter.radius();
         let surfaces = match drive {
             OffsetDrive::InPlane => blade.offset_in_planes(radius),
             OffsetDrive::Published => blade.offset_as_published(radius, self.scene.tolerance.chord),
@@ -284,9 +301,13 @@ impl Session {
         Ok(Box::new(OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) }))
     }
 
-    /// The header of a toolpath's programs.
-    pub fn header(&self, name: &str) -> ProgramHeader {
-        header(&self.scene, name)
+    /// The header of a toolpath's programs, which begin and end no lower than `rise_to`, mm.
+    fn header(&self, request: &ToolpathRequest, rise_to: Option<f64>) -> ProgramHeader {
+        ProgramHeader {
+            name: format!("{} - {}", self.scene.title, request.name),
+            spindle_speed: Some(request.tooling.cutting.spindle_speed),
+            rise_to,
+        }
     }
 
     /// Measures the engagement of a pocket's passes and lowers the feed where it is above the strategy's
@@ -301,8 +322,8 @@ impl Session {
         else {
             return Ok(None);
         };
-        let arcs = self.contact_arcs(path, UNCOUNTED_LAYER, monitor)?;
-        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, self.scene.cutter.radius())))
+        let arcs = self.contact_arcs(request, path, UNCOUNTED_LAYER, monitor)?;
+        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, request.tooling.cutter.radius())))
     }
 
     /// The engagement of a pocket's passes with all layers counted that may be chips, where one was asked
@@ -315,18 +336,19 @@ impl Session {
     ) -> Result<Option<(Engagement, f64)>, JobError> {
         let strategy = request.strategy.downcast_ref::<PocketStrategy>();
         let Some(limit) = strategy.and_then(|strategy| strategy.engagement) else { return Ok(None) };
-        let arcs = self.contact_arcs(path, THIN_LAYER, monitor)?;
+        let arcs = self.contact_arcs(request, path, THIN_LAYER, monitor)?;
         Ok(Some((engagement(path, &arcs.of_moves, limit), arcs.bound())))
     }
 
     fn contact_arcs(
         &self,
+        request: &ToolpathRequest,
         path: &Toolpath,
         film: f64,
         monitor: &dyn Monitor,
     ) -> Result<ContactArcs, Cancelled> {
         let of_passes = |step: &Move| step.kind == MoveKind::Cut;
-        contact_arcs(path, &self.scene.cutter, &self.stock, film, &of_passes, monitor)
+        contact_arcs(path, &request.tooling.cutter, &self.stock, film, &of_passes, monitor)
     }
 }
 
@@ -452,9 +474,9 @@ fn within_engagement(
 }
 
 /// From the tip to the cutter's upper end, mm.
-fn cutting_length(scene: &Scene) -> f64 {
-    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
-    length.max(scene.cutter.radius())
+fn cutting_length(Tooling { cutter, holder, .. }: &Tooling) -> f64 {
+    let length = holder.as_ref().map_or(cutter.words().length, |holder| holder.cutting_length());
+    length.max(cutter.radius())
 }
 
 /// Joints follow a path within this share of the chord tolerance, by which all that is measured may be off.
@@ -465,27 +487,30 @@ const FOLLOWED: f64 = 0.1;
 const LEAST_AIM: f64 = 0.5;
 
 /// How joints follow a path: the whole tool stays near the motion between locations that is measured.
-fn following(scene: &Scene, five_axis: &FiveAxis) -> Following {
-    let tool = Tool::of(scene);
-    let reach = tool.holder.iter().map(Solid::reach).fold(tool.cutter.reach(), f64::max);
-    five_axis.post.following(FOLLOWED * scene.tolerance.chord, reach)
+fn following(scene: &Scene, tool: &Tool, five_axis: &FiveAxis) -> Following {
+    five_axis.post.following(FOLLOWED * scene.tolerance.chord, tool.reach())
 }
 
 /// How far the joints of the scene's five-axis machine may lead any place of a leaning tool astray, mm.
-pub(crate) fn may_stray(scene: &Scene) -> f64 {
+pub(crate) fn may_stray(scene: &Scene, tool: &Tool) -> f64 {
     let of = |five_axis| {
-        let tip = following(scene, five_axis).tip;
+        let tip = following(scene, tool, five_axis).tip;
         FOLLOWED * scene.tolerance.chord + if tip.is_finite() { tip } else { 0.0 }
     };
     scene.five_axis.as_ref().map_or(0.0, of)
 }
 
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one.
-fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath>, JobError> {
+fn joints(
+    scene: &Scene,
+    request: &ToolpathRequest,
+    tool: &Tool,
+    path: &Toolpath,
+) -> Result<Option<JointPath>, JobError> {
     let Some(five_axis) = &scene.five_axis else { return Ok(None) };
-    let following = following(scene, five_axis);
+    let following = following(scene, tool, five_axis);
     let refused =
-        |reason| JobError::Machine { scene: scene.source.name.clone(), name: name.to_owned(), reason };
+        |reason| JobError::Machine { scene: scene.source.name.clone(), name: request.name.clone(), reason };
     let joints = follow(&five_axis.kinematics, path, &following).map_err(|e| refused(e.to_string()))?;
     match joints.report.obstacle() {
         Some(obstacle) => Err(refused(obstacle.to_string())),
@@ -497,7 +522,7 @@ fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath
 /// machine.
 fn lines(
     scene: &Scene,
-    path: &Toolpath,
+    path: (&Toolpath, &Cutter),
     joints: Option<&JointPath>,
     header: &ProgramHeader,
 ) -> Result<MoveLines, JobError> {
@@ -505,21 +530,12 @@ fn lines(
     written.map_err(|error| JobError::Program(error.to_string()))
 }
 
-/// The header of a toolpath's program.
-fn header(scene: &Scene, name: &str) -> ProgramHeader {
-    ProgramHeader {
-        name: format!("{} - {name}", scene.title),
-        spindle_speed: Some(scene.cutting.spindle_speed),
-        rise_to: None,
-    }
-}
-
 /// Writes a path as G-code; tells the line of each move. A path that tilts the tool has no program, and no
 /// lines, where the scene names no machine for it.
 pub(crate) fn write_program(
     out: &mut dyn std::io::Write,
     scene: &Scene,
-    path: &Toolpath,
+    (path, cutter): (&Toolpath, &Cutter),
     joints: Option<&JointPath>,
     header: &ProgramHeader,
 ) -> std::io::Result<MoveLines> {
@@ -527,7 +543,7 @@ pub(crate) fn write_program(
         return if path.is_upright() {
             let acceleration = scene.machine.acceleration;
             let arcs = scene.arcs.map(|tolerance| ArcRule { tolerance, acceleration });
-            gcode::write(out, path, &scene.cutter, header, arcs)
+            gcode::write(out, path, cutter, header, arcs)
         } else {
             Ok(MoveLines::new())
         };
@@ -539,5 +555,5 @@ pub(crate) fn write_program(
         tcp_words: five_axis.tcp_words.each_ref().map(String::as_str),
         rapid_rate: scene.machine.rapid_rate,
     };
-    gcode::write_five_axis(out, path, &post, &scene.cutter, header)
+    gcode::write_five_axis(out, path, &post, cutter, header)
 }

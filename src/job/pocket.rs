@@ -82,7 +82,7 @@ pub(crate) fn pocket_figures(
 /// The tool with the least radius, by which walls are reached.
 fn narrowest<'a>(session: &'a Session, tools: &'a [ToolMoves<'_>]) -> &'a Cutter {
     let cutters = tools.iter().map(|tool| tool.cutter);
-    cutters.min_by(|a, b| a.radius().total_cmp(&b.radius())).unwrap_or(&session.scene.cutter)
+    cutters.min_by(|a, b| a.radius().total_cmp(&b.radius())).unwrap_or(&session.scene.tooling.cutter)
 }
 
 /// What tools leave on the walls that they come to, above the round of their corners.

@@ -5,7 +5,7 @@ use metrology::{Budget, Measured, Measurement, View};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use report::Claim;
-use scene::{Scene, ToolpathRequest};
+use scene::{Scene, Tooling, ToolpathRequest};
 
 use super::covered::Covered;
 use super::earlier::{EarlierPath, WholePath};
@@ -40,6 +40,11 @@ pub(crate) struct Run<'a> {
 impl Run<'_> {
     pub fn scene(&self) -> &Scene {
         &self.session.scene
+    }
+
+    /// What cuts, where it is planned by the scene.
+    pub fn tooling(&self) -> &Tooling {
+        &self.request.tooling
     }
 
     pub fn part(&self) -> &Part {

@@ -4,17 +4,17 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use blade::Blade;
-use cutter::Holder;
+use cutter::{Cutter, Holder};
 use field::ShortestPossible;
 use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::digest::{self, Fingerprint};
-use metrology::{Budget, Engine, LaidOut, Measured, Simulation, Task};
+use metrology::{Budget, Engine, LaidOut, Limits, Measured, Simulation, Task};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use report::{InputFile, Verdict};
 use scene::{Fixture, Loaded, MeshFile, Scene, StockRequest, ToolpathRequest, load_mesh, load_part};
 use sim::{Grid, Stock};
-use toolpath::{PlanError, Pocket, shortest_possible};
+use toolpath::{PlanError, Pocket, Step, shortest_possible};
 use work::aside;
 use work::monitor::{Cancelled, Monitor, Silent};
 
@@ -50,10 +50,10 @@ pub struct Session {
     pub doubt: Option<String>,
     /// The files that the scene names, as they were read.
     pub inputs: Vec<InputFile>,
-    /// The scene's cutter, for all moves.
-    cutters: Cutters,
-    /// The shortest possible paths that were found, with their scallop heights, mm.
-    shortest: Mutex<Vec<(f64, ShortestPossible)>>,
+    /// The tolerances of a toolpath that leaves the rest to another: of what it leaves, none can be exceeded.
+    leaving: Limits,
+    /// The shortest possible paths that were found, with their cutters and scallop heights, mm.
+    shortest: Mutex<Vec<(Cutter, f64, ShortestPossible)>>,
 }
 
 /// How well it is known that a part lies in a mesh.
@@ -74,7 +74,8 @@ fn stock_of(
         &StockRequest::Around { allowance, margin, .. } => {
             let Aabb { mut min, mut max } = part.bounds();
             // The measured floor ends where the flat of the cutter's bottom does.
-            let beyond = pocket.map_or(0.0, |_| scene.cutter.radius() - scene.cutter.flat_radius());
+            let beyond =
+                pocket.map_or(0.0, |_| scene.tooling.cutter.radius() - scene.tooling.cutter.flat_radius());
             let margin = margin + beyond;
             let face = pocket.map_or(max.z, |_| 0.0);
             min -= Vector3::new(margin, margin, BASE);
@@ -171,7 +172,8 @@ impl Session {
         }
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
-        let cutters = Cutters::from(&scene.cutter);
+        let tallest = stock.bounds().size().norm();
+        let leaving = Limits { scallop: tallest, uncut: tallest, ..scene.tolerance };
         Ok(Self {
             scene,
             part,
@@ -182,7 +184,7 @@ impl Session {
             notes,
             doubt,
             inputs,
-            cutters,
+            leaving,
             shortest: Mutex::default(),
         })
     }
@@ -195,16 +197,17 @@ impl Session {
     /// What no path of an upright cutter below a scallop height, mm, is shorter than: the same for all plans.
     pub(crate) fn shortest_possible(
         &self,
+        cutter: &Cutter,
         height: f64,
         monitor: &dyn Monitor,
     ) -> Result<ShortestPossible, PlanError> {
         // Not locked while it is sought: a thread that waits for its share of that may come by here.
         let known = || self.shortest.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, shortest)) = known().iter().find(|(of, _)| *of == height) {
+        if let Some((.., shortest)) = known().iter().find(|(with, of, _)| with == cutter && *of == height) {
             return Ok(*shortest);
         }
-        let shortest = shortest_possible(&self.part, &self.scene.cutter, height, monitor)?;
-        known().push((height, shortest));
+        let shortest = shortest_possible(&self.part, cutter, height, monitor)?;
+        known().push((*cutter, height, shortest));
         Ok(shortest)
     }
 
@@ -288,11 +291,11 @@ impl Session {
     }
 
     /// The cutters of a toolpath and what holds each: those of its program where all tools of one are meant,
-    /// else the scene's.
-    pub(crate) fn tools<'a>(&'a self, request: &'a ToolpathRequest) -> (&'a Cutters, &'a [Option<Holder>]) {
-        let of_program = request.foreign().and_then(|read| read.tools.as_ref());
-        let of_scene = || (&self.cutters, std::slice::from_ref(&self.scene.holder));
-        of_program.map_or_else(of_scene, |(cutters, holders)| (cutters, holders.as_slice()))
+    /// else its own.
+    pub(crate) fn tools(&self, request: &ToolpathRequest) -> (Cutters, Vec<Option<Holder>>) {
+        let of_program = request.foreign().and_then(|read| read.tools.clone());
+        let own = || (Cutters::from(&request.tooling.cutter), vec![request.tooling.holder.clone()]);
+        of_program.unwrap_or_else(own)
     }
 
     pub(crate) fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
@@ -303,21 +306,45 @@ impl Session {
         self.refused(request, PlanError::NotApplicable { strategy: request.strategy_name(), reason })
     }
 
-    /// A path to cut and to measure.
+    /// The toolpath that cuts what this one leaves.
+    fn behind(&self, request: &ToolpathRequest) -> Option<&ToolpathRequest> {
+        let mut after = self.scene.toolpaths.iter().skip_while(|other| other.name != request.name).skip(1);
+        after.next().filter(|next| next.stock_is_previous)
+    }
+
+    /// Whether the next toolpath cuts what this one leaves.
+    pub(crate) fn goes_on(&self, request: &ToolpathRequest) -> bool {
+        self.behind(request).is_some()
+    }
+
+    /// Whether the next toolpath is for what this one cannot reach.
+    pub(crate) fn rest_follows(&self, request: &ToolpathRequest) -> bool {
+        self.behind(request).is_some_and(|next| next.rest)
+    }
+
+    /// Whether it is measured for nothing but gouges: another toolpath cuts off what it leaves, and it is not
+    /// corrected by that.
+    pub(crate) fn leaves_the_rest(&self, request: &ToolpathRequest) -> bool {
+        let is_corrected = request.correct && matches!(request.step, Step::Scallop(_));
+        self.goes_on(request) && !is_corrected
+    }
+
+    /// A path to cut and to measure, with what makes its moves.
     pub(crate) fn task<'a>(
         &'a self,
-        path: &'a Toolpath,
+        request: &'a ToolpathRequest,
+        (path, cutters): (&'a Toolpath, &'a Cutters),
         simulation: &'a Simulation,
         cells: &'a LaidOut,
     ) -> Task<'a> {
         Task {
             part: &self.part,
-            cutters: &self.cutters,
-            holder: self.scene.holder.as_ref(),
+            cutters,
+            holder: request.tooling.holder.as_ref(),
             path,
             stock: &self.stock,
             cells,
-            limits: &self.scene.tolerance,
+            limits: if self.leaves_the_rest(request) { &self.leaving } else { &self.scene.tolerance },
             simulation,
             budget: self.budget(),
             judged: self.scene.judged,

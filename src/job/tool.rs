@@ -1,13 +1,15 @@
 //! The tool as a solid, what it must keep away from, and the moves of each tool of a path.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Holder, Solid};
 use geometry::{Bvh, TriangleMesh};
 use motion::{Cutters, ROUNDING, Toolpath};
 use part::Part;
-use scene::Scene;
+use scene::{Scene, Tooling};
+use toolpath::Rest;
 
 use super::planned::may_stray;
 
@@ -26,14 +28,19 @@ pub(crate) struct Tool {
 }
 
 impl Tool {
-    /// The tool of a scene.
-    pub fn of(scene: &Scene) -> Self {
-        Self::new(&scene.cutter, scene.holder.as_ref())
+    /// Of a cutter and what holds it.
+    pub fn of(Tooling { cutter, holder, .. }: &Tooling) -> Self {
+        Self::new(cutter, holder.as_ref())
     }
 
-    /// Of a cutter and what holds it.
+    /// As [`Tool::of`].
     pub fn new(cutter: &Cutter, holder: Option<&Holder>) -> Self {
         Self { cutter: Solid::of_cutter(cutter, holder), holder: holder.map(Solid::of_holder) }
+    }
+
+    /// How far shank and holder reach from the tip at most, mm.
+    pub fn reach(&self) -> f64 {
+        self.holder.iter().map(Solid::reach).fold(self.cutter.reach(), f64::max)
     }
 
     /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and
@@ -49,7 +56,7 @@ impl Tool {
         let obstacle = Obstacle::new(part.mesh(), part.bvh());
         let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
         let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
-        let off = keep.clearance + part.mesh_deviation() + may_stray(scene) + WRITTEN;
+        let off = keep.clearance + part.mesh_deviation() + may_stray(scene, self) + WRITTEN;
         checks.extend(self.holder.as_ref().map(|solid| Check { solid, obstacle, needed: off }));
         checks.extend(self.keep_off_fixtures(scene, fixtures).checks);
         Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
@@ -60,7 +67,7 @@ impl Tool {
         let solids = || std::iter::once(&self.cutter).chain(&self.holder);
         let of_one = |(mesh, bvh): &'a FixtureMesh| {
             let obstacle = Obstacle::new(mesh, bvh);
-            let needed = scene.keep_clear.clearance + may_stray(scene) + WRITTEN;
+            let needed = scene.keep_clear.clearance + may_stray(scene, self) + WRITTEN;
             solids().map(move |solid| Check { solid, obstacle, needed })
         };
         Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }
@@ -103,4 +110,6 @@ pub(crate) struct Around<'a> {
     pub near: &'a Part,
     /// Clamps and the like.
     pub fixtures: &'a [FixtureMesh],
+    /// What the toolpaths before left, where it is for that.
+    pub rest: Option<&'a Arc<Rest>>,
 }

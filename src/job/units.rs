@@ -15,7 +15,7 @@ const LARGEST: f64 = 1e4;
 /// What is to be said of sizes beyond belief.
 pub(crate) fn doubt(scene: &Scene, part: &Part) -> Option<String> {
     let size = part.bounds().size();
-    let (length, diameter) = (size.x.max(size.y).max(size.z), 2.0 * scene.cutter.radius());
+    let (length, diameter) = (size.x.max(size.y).max(size.z), 2.0 * scene.tooling.cutter.radius());
     let guess = match length / diameter {
         share if share < SMALLEST => "metres or inches",
         share if share > LARGEST => "micrometres",

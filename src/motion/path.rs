@@ -122,6 +122,14 @@ impl Toolpath {
         Self { start, moves, origin: Origin::default() }
     }
 
+    /// The path moved by a vector, mm.
+    #[must_use]
+    pub fn moved(mut self, by: Vector3) -> Self {
+        self.start.tip += by;
+        self.moves.iter_mut().for_each(|step| step.to.tip += by);
+        self
+    }
+
     /// The line of the program that a move stands in; `None` without a program.
     pub fn line_of(&self, move_index: usize) -> Option<u32> {
         self.origin.lines.get(move_index).copied()

@@ -63,7 +63,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     } else {
         let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
         let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
-        let any_radius = table.tools.is_empty().then(|| scene.cutter.radius());
+        let any_radius = table.tools.is_empty().then(|| scene.tooling.cutter.radius());
         let longest = lengths.values().copied().fold(0.0, f64::max);
         let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
         match read_gcode(&name, &bytes, control, &setup) {
@@ -120,7 +120,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         }
     } else {
         let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
-        told_otherwise(&said, tool, &scene.cutter, &read.name, &mut notes);
+        told_otherwise(&said, tool, &scene.tooling.cutter, &read.name, &mut notes);
         let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
         let (path, joints) = joined(runs.into_iter().filter(|run| run.tool == tool));
         findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);

@@ -18,7 +18,10 @@ mod read;
 mod stock;
 #[cfg(test)]
 mod tests;
+mod tooling;
 mod write;
+
+use std::sync::Arc;
 
 pub use axis::AxisRequest;
 pub use bodies::{BodyShape, MachineBodies, MachineBody};
@@ -33,10 +36,11 @@ pub use part::{
     OutlineSource, PartSource, PocketSource, unmeasured_beside_walls,
 };
 pub use stock::StockRequest;
+pub use tooling::{CuttingData, Tooling};
 pub use write::complete_toml;
 
-use cutter::{Cutter, Holder};
 pub use foreign::{TableError, described_tools, scene_table, tool_table};
+use geometry::Region;
 use machine::Machine;
 pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};
@@ -73,17 +77,6 @@ pub fn default_error_bound(limits: &Limits) -> f64 {
     (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
 }
 
-/// Speeds of the cutter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CuttingData {
-    /// Spindle speed, rev/min.
-    pub spindle_speed: f64,
-    /// Feed along passes, mm/min.
-    pub feed_rate: f64,
-    /// Feed down to a pass, mm/min.
-    pub plunge_rate: f64,
-}
-
 /// One toolpath to plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolpathRequest {
@@ -93,8 +86,14 @@ pub struct ToolpathRequest {
     pub folder: String,
     /// How to plan it.
     pub strategy: Box<dyn Strategy>,
+    /// With what.
+    pub tooling: Tooling,
     /// How far its passes lie apart.
     pub step: Step,
+    /// How deep each of its levels goes below the one above at most, mm; `None` in one step down.
+    pub stepdown: Option<f64>,
+    /// What it leaves on the part for a toolpath behind it, mm.
+    pub allowance: f64,
     /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the
     /// strategy.
     pub directions: Vec<NamedFile>,
@@ -104,6 +103,10 @@ pub struct ToolpathRequest {
     pub joining: Joining,
     /// The slopes of the faces that it is made for, degrees from the level.
     pub slope: [f64; 2],
+    /// Within it its axis stays, in the plan view; `None` for the whole part.
+    pub boundary: Option<Arc<Region>>,
+    /// Whether its passes are where the toolpaths before it left too much, and nowhere else.
+    pub rest: bool,
     /// How its axis is tilted; `None` for an upright one.
     pub axis: Option<AxisRequest>,
     /// Whether it cuts what the toolpath before it left, and not a block of its own.
@@ -121,6 +124,11 @@ impl ToolpathRequest {
     /// The faces that it is made for.
     pub fn faces(&self) -> Faces {
         Faces::of_slopes(self.slope.map(f64::to_radians))
+    }
+
+    /// Whether its passes are in some places of the plan view alone.
+    pub fn is_for_places(&self) -> bool {
+        self.boundary.is_some() || self.rest
     }
 
     /// What was read of it, where it is a program from elsewhere.
@@ -154,12 +162,8 @@ pub struct Scene {
     pub stock: StockRequest,
     /// Whether the scene says how wide that is, and not the default.
     pub stock_is_stated: bool,
-    /// With what.
-    pub cutter: Cutter,
-    /// What holds it; `None` leaves collisions of shank and holder unchecked.
-    pub holder: Option<Holder>,
-    /// How fast.
-    pub cutting: CuttingData,
+    /// With what, unless a toolpath has a tool of its own.
+    pub tooling: Tooling,
     /// What is tolerated.
     pub tolerance: Limits,
     /// Which ridges may exceed the scallop tolerance.
@@ -184,21 +188,27 @@ pub struct Scene {
     pub toolpaths: Vec<ToolpathRequest>,
 }
 
-/// The cell that suits a cutter and the steps of its toolpaths: six cells between passes and thirty a
-/// radius (sixty for a flat, whose edge is sharp), rounded down to 1, 2 or 5 times a power of ten. A
-/// ball of 6 mm gets 0.05 mm at a scallop of 10 µm. With fewer cells between passes a narrow pass may
-/// be lowest on none of them, and the error bounds grow; more cost memory and time as their square.
-pub fn auto_cell(cutter: &Cutter, toolpaths: &[ToolpathRequest]) -> f64 {
+/// The cell that suits the cutters and the steps of toolpaths: six cells between passes and thirty a radius
+/// (sixty for a flat, whose edge is sharp), rounded down to 1, 2 or 5 times a power of ten. A ball of 6 mm
+/// gets 0.05 mm at a scallop of 10 µm. With fewer cells between passes a narrow pass may be lowest on none of
+/// them, and the error bounds grow; more cost memory and time as their square.
+pub fn auto_cell(toolpaths: &[ToolpathRequest]) -> f64 {
     const CELLS_A_PASS: f64 = 6.0;
     const CELLS_A_RADIUS: f64 = 30.0;
-    let corner = cutter.corner_radius();
-    let coarsest = cutter.radius() / if corner > 0.0 { CELLS_A_RADIUS } else { 2.0 * CELLS_A_RADIUS };
-    let exact = toolpaths.iter().fold(coarsest, |cell, request| match request.step {
-        Step::Stepover(width) => cell.min(width / CELLS_A_PASS),
-        // The strip of a corner of radius r on a plane is √(8rh) wide; a flat has none.
-        Step::Scallop(height) if corner > 0.0 => cell.min((8.0 * corner * height).sqrt() / CELLS_A_PASS),
-        Step::Scallop(_) => cell,
-    });
+    let of_one = |request: &ToolpathRequest| {
+        let cutter = &request.tooling.cutter;
+        let corner = cutter.corner_radius();
+        let coarsest = cutter.radius() / if corner > 0.0 { CELLS_A_RADIUS } else { 2.0 * CELLS_A_RADIUS };
+        match request.step {
+            Step::Stepover(width) => coarsest.min(width / CELLS_A_PASS),
+            // The strip of a corner of radius r on a plane is √(8rh) wide; a flat has none.
+            Step::Scallop(height) if corner > 0.0 => {
+                coarsest.min((8.0 * corner * height).sqrt() / CELLS_A_PASS)
+            }
+            Step::Scallop(_) => coarsest,
+        }
+    };
+    let exact = toolpaths.iter().map(of_one).fold(f64::INFINITY, f64::min);
     // Finer than scenes may ask for is finer than heights are resolved.
     let exact = exact.max(*keys::LENGTH.start());
     let exponent = exact.log10().floor() as i32;

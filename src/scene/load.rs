@@ -11,7 +11,7 @@ use crate::{Scene, StockRequest};
 fn loading(scene: &Scene) -> Loading<'_> {
     Loading {
         source: &scene.source,
-        cutter: &scene.cutter,
+        cutter: &scene.tooling.cutter,
         chord_tolerance: scene.tolerance.chord,
         flattening: flattening(&scene.tolerance),
         margin: match scene.stock {

@@ -1,14 +1,16 @@
 //! From text to a checked scene.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use super::tooling::SPEEDS;
 use super::{
-    CuttingData, DEFAULT_CLEARANCE, DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MEMORY_MIB,
-    DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene,
-    Simulation, ToolpathRequest, auto_cell, default_error_bound,
+    DEFAULT_CLEARANCE, DEFAULT_LIMITS, DEFAULT_MEMORY_MIB, DEFAULT_REMOVAL, EngineChoice, NamedFile,
+    PartSource, Scene, Simulation, Tooling, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, bodies, compare, direction, foreign, interference, kinematics, part, stock};
-use cutter::{Cutter, Holder, HolderSection};
+use super::{axis, bodies, compare, direction, foreign, interference, kinematics, part, stock, tooling};
+use cutter::Cutter;
+use geometry::Region;
 use io::regular;
 use keys::{Located, SceneError, SceneText, Section, printable};
 use machine::{Blending, Machine};
@@ -19,7 +21,7 @@ use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, 
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Feeds and speeds that make sense.
-const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+pub(super) const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
 
 /// Lines of a program that controls run in a second.
 const BLOCK_RATE: std::ops::RangeInclusive<f64> = 1.0..=1e6;
@@ -96,11 +98,10 @@ impl Scene {
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
         let part = part::read(&root.section("part")?, &folder)?;
         let judged = part::read_judged(&root.section("part")?)?;
-        let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let tooling = tooling::read(&root)?;
         let section = root.section("stock")?;
-        let stock = stock::read(&section, &folder, &part, &cutter)?;
+        let stock = stock::read(&section, &folder, &part, &tooling.cutter)?;
         let stock_is_stated = !stock.is_around() || section.has("margin");
-        let holder = read_holder(&root, &cutter)?;
         let section = root.section("tolerance")?;
         let tolerance = read_tolerance(&section)?;
         let scallop_rule = read_scallop_rule(&section)?;
@@ -116,7 +117,7 @@ impl Scene {
                 "delete it, or delete [compare]",
             ));
         }
-        let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
+        let mut simulation = read_simulation(&root.section("simulation")?, &tolerance)?;
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
@@ -127,14 +128,14 @@ impl Scene {
             return Err(section.error(&section.key_span("blending"), message, "delete it"));
         }
         let bodies = bodies::read(&section, five_axis.as_ref())?;
-        let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
+        let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &tooling, &minutes)?;
         if toolpaths.iter().any(|request| !request.is_foreign()) {
             kinematics::known_height(&section, five_axis.as_ref())?;
-            check_rates(&root.section("cutter")?, &section, &cutting, &machine)?;
+            tooling::check_rates(&root, &tooling, &toolpaths, &machine)?;
         }
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
-            simulation.cell = auto_cell(&cutter, &toolpaths);
+            simulation.cell = auto_cell(&toolpaths);
         }
         Ok(Self {
             source: source.clone(),
@@ -143,9 +144,7 @@ impl Scene {
             judged,
             stock,
             stock_is_stated,
-            cutter,
-            holder,
-            cutting,
+            tooling,
             tolerance,
             scallop_rule,
             off_direction,
@@ -207,92 +206,6 @@ impl Scene {
     }
 }
 
-/// Keys of [cutter] beside its shape.
-const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
-
-fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
-    let cutter = Cutter::read(section, &SPEEDS)?;
-    let rate =
-        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
-    let cutting = CuttingData {
-        spindle_speed: rate("spindle_speed", DEFAULT_SPINDLE_SPEED)?,
-        feed_rate: rate("feed_rate", DEFAULT_FEED_RATE)?,
-        plunge_rate: rate("plunge_rate", DEFAULT_PLUNGE_RATE)?,
-    };
-    Ok((cutter, cutting))
-}
-
-/// Refuses feeds that the machine does not reach.
-fn check_rates(
-    cutter: &Section<'_>,
-    machine_section: &Section<'_>,
-    cutting: &CuttingData,
-    machine: &Machine,
-) -> Result<(), SceneError> {
-    let rates = [("feed_rate", cutting.feed_rate), ("plunge_rate", cutting.plunge_rate)];
-    let Some((key, rate)) = rates.into_iter().find(|(_, rate)| *rate > machine.rapid_rate) else {
-        return Ok(());
-    };
-    let (section, stated) = if cutter.has(key) { (cutter, key) } else { (machine_section, "rapid_rate") };
-    let message = format!(
-        "`{key}` is {rate} mm/min, more than the machine's `rapid_rate` of {} mm/min",
-        machine.rapid_rate
-    );
-    let cure = format!(
-        "write `{key} = {}` in [cutter] or less, or a greater `rapid_rate` in [machine]",
-        machine.rapid_rate
-    );
-    Err(section.error(&section.key_span(stated), message, cure))
-}
-
-/// What holds the cutter, if the scene says so.
-fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
-    if !root.has("holder") {
-        return Ok(None);
-    }
-    let holder = root.section("holder")?;
-    holder.only(&["cutting_length", "section"], &[], "[holder]")?;
-    let length = match (holder.length("cutting_length")?, cutter.stated_length()) {
-        (None, Some(length)) => length,
-        (None, None) => holder.required_length("cutting_length", 20.0)?.value,
-        // The cutter's own length is its side height within rounding, and is written as the default.
-        (Some(length), stated) if length.value < cutter.side_height() && stated != Some(length.value) => {
-            let message = format!(
-                "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",
-                length.value,
-                cutter.side_height()
-            );
-            return Err(holder.error(
-                &length.span,
-                message,
-                "write how far the cutting edges reach up from the tip",
-            ));
-        }
-        (Some(length), _) => length.value,
-    };
-    let sections: Vec<HolderSection> = holder
-        .sections("section")?
-        .iter()
-        .map(|section| {
-            section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
-            let diameter = section.required_length("diameter", 32.0)?.value;
-            let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
-            Ok(HolderSection {
-                diameter,
-                top_diameter,
-                length: section.required_length("length", 40.0)?.value,
-            })
-        })
-        .collect::<Result<_, SceneError>>()?;
-    Holder::new(length, sections).map(Some).map_err(|e| {
-        holder.error(
-            holder.header(),
-            e.to_string(),
-            "add `[[holder.section]]` with `diameter` and `length` for shank and holder, the lowest first",
-        )
-    })
-}
-
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
     const KEYS: [&str; 8] =
         ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "direction", "correct"];
@@ -330,12 +243,8 @@ fn read_scallop_rule(section: &Section<'_>) -> Result<ScallopRule, SceneError> {
     })
 }
 
-/// An automatic cell is that of the cutter alone until the toolpaths are known.
-fn read_simulation(
-    section: &Section<'_>,
-    cutter: &Cutter,
-    limits: &Limits,
-) -> Result<Simulation, SceneError> {
+/// An automatic cell is unknown until the toolpaths are read.
+fn read_simulation(section: &Section<'_>, limits: &Limits) -> Result<Simulation, SceneError> {
     section.only(
         &["cell", "memory_mib", "engine", "removal", "error_bound", "voxel"],
         &[],
@@ -345,7 +254,7 @@ fn read_simulation(
     let engine =
         section.word("engine", &EngineChoice::words())?.and_then(|word| EngineChoice::from_word(word.value));
     Ok(Simulation {
-        cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
+        cell: cell.unwrap_or(f64::NAN),
         cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
         engine: engine.unwrap_or_default(),
@@ -432,7 +341,7 @@ fn read_toolpaths(
     folder: &Path,
     limits: &Limits,
     correct: bool,
-    cutter: &Cutter,
+    of_scene: &Tooling,
     minutes: &[f64],
 ) -> Result<Vec<ToolpathRequest>, SceneError> {
     let sections = root.sections("toolpath")?;
@@ -445,7 +354,7 @@ fn read_toolpaths(
     }
     let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
     let read = |section| {
-        let request = read_toolpath(section, folder, limits, correct, cutter)?;
+        let request = read_toolpath(section, folder, limits, correct, of_scene)?;
         let times = compare::at_times(request, section, minutes)?;
         Ok(times.into_iter().map(move |request| (section, request)))
     };
@@ -454,7 +363,16 @@ fn read_toolpaths(
         let place = first.key_span("stock");
         return Err(first.error(&place, "no toolpath comes before this one", "delete `stock` here"));
     }
-    for (section, request) in all.into_iter().flatten() {
+    let all: Vec<(&Section<'_>, ToolpathRequest)> = all.into_iter().flatten().collect();
+    check_allowances(&all)?;
+    // What it leaves elsewhere is a matter of the toolpath behind it.
+    let goes_on =
+        |k: usize| all.get(k + 1).is_some_and(|(_, next): &(_, ToolpathRequest)| next.stock_is_previous);
+    let goes_on: Vec<bool> = (0..all.len()).map(goes_on).collect();
+    for ((section, mut request), goes_on) in all.into_iter().zip(goes_on) {
+        if goes_on && request.is_for_places() {
+            request.correct = false;
+        }
         if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
             let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
             let message = if other.name == request.name {
@@ -482,6 +400,16 @@ pub(super) const PREVIOUS_STOCK: &str = "previous";
 /// The key of the slopes that a toolpath is made for.
 pub(super) const SLOPE: &str = "slope";
 
+/// The key of how far levels lie apart at most.
+pub(super) const STEPDOWN: &str = "stepdown";
+
+/// The key of what a toolpath leaves on the part.
+pub(super) const ALLOWANCE: &str = "allowance";
+
+/// The key of the curves within which a toolpath stays, and that of what others left.
+pub(super) const BOUNDARY: &str = "boundary";
+pub(super) const REST: &str = "rest";
+
 /// From level ground to walls, degrees.
 pub(super) const ALL_SLOPES: [f64; 2] = [0.0, 90.0];
 
@@ -490,8 +418,10 @@ fn read_toolpath(
     folder: &Path,
     limits: &Limits,
     correct: bool,
-    cutter: &Cutter,
+    of_scene: &Tooling,
 ) -> Result<ToolpathRequest, SceneError> {
+    let tooling = tooling::read_own(section, of_scene)?;
+    let cutter = &tooling.cutter;
     let read = read_strategy(section, cutter.radius())?;
     let kind = read.strategy.definition().part;
     let surface = kind == PartKind::Surface;
@@ -510,15 +440,23 @@ fn read_toolpath(
     let directions = read.tables.into_iter().map(named).collect();
     let stock_is_previous = kind != PartKind::Pocket && section.word("stock", &[PREVIOUS_STOCK])?.is_some();
     let correct = if surface { section.flag("correct")?.unwrap_or(correct) } else { false };
+    let boundary = if surface { read_boundary(section, axis.is_some())? } else { None };
+    let rest = surface && read_rest(section, axis.is_some())?;
+    let [stepdown, allowance] = if surface { read_roughing(section, axis.is_some())? } else { [None; 2] };
     Ok(ToolpathRequest {
         name,
         folder: own_folder,
         strategy: read.strategy,
+        tooling,
         step,
+        stepdown,
+        allowance: allowance.unwrap_or_default(),
         directions,
         correct,
         joining,
         slope,
+        boundary,
+        rest,
         axis,
         stock_is_previous,
         equal_time: None,
@@ -549,6 +487,80 @@ fn read_slope(section: &Section<'_>, tilts: bool) -> Result<[f64; 2], SceneError
         return Err(section.error(&section.key_span(SLOPE), "`slope` does not apply beside `axis`", cure));
     }
     Ok(slope)
+}
+
+/// The curves within which a toolpath stays: those within others are islands.
+fn read_boundary(section: &Section<'_>, tilts: bool) -> Result<Option<Arc<Region>>, SceneError> {
+    let curves = section.curves(BOUNDARY)?;
+    if curves.is_empty() {
+        return Ok(None);
+    }
+    if tilts {
+        return Err(beside_axis(section, BOUNDARY));
+    }
+    let curves = curves.into_iter().map(|curve| curve.value).collect();
+    let region = Region::nested(curves).map_err(|error| {
+        let cure = format!(
+            "write closed curves that neither cross nor touch: `{BOUNDARY} = [[[0, 0], [40, 0], [40, 30]]]`"
+        );
+        section.error(&section.key_span(BOUNDARY), format!("`{BOUNDARY}`: {error}"), cure)
+    })?;
+    Ok(Some(Arc::new(region.0)))
+}
+
+/// Whether a toolpath is for what those before it left.
+fn read_rest(section: &Section<'_>, tilts: bool) -> Result<bool, SceneError> {
+    let rest = section.flag(REST)?.unwrap_or(false);
+    if rest && tilts {
+        return Err(beside_axis(section, REST));
+    }
+    if rest && !section.has("stock") {
+        let message = format!("`{REST}` in a toolpath that cuts a block of its own");
+        let cure =
+            format!("add `stock = \"{PREVIOUS_STOCK}\"`: the rest is what the toolpaths before it left");
+        return Err(section.error(&section.key_span(REST), message, cure));
+    }
+    Ok(rest)
+}
+
+fn beside_axis(section: &Section<'_>, key: &str) -> SceneError {
+    let message = format!("`{key}` does not apply beside `axis`");
+    section.error(&section.key_span(key), message, "delete one of the two")
+}
+
+/// How deep each level of a toolpath goes below the one above, and what it leaves on the part, mm.
+fn read_roughing(section: &Section<'_>, tilts: bool) -> Result<[Option<f64>; 2], SceneError> {
+    let mut found = [None; 2];
+    for (value, key) in found.iter_mut().zip([STEPDOWN, ALLOWANCE]) {
+        *value = section.length(key)?.map(|v| v.value);
+        if value.is_some() && tilts {
+            return Err(beside_axis(section, key));
+        }
+    }
+    let [_, allowance] = found;
+    // Ridges over what is left on the part are none of the part's.
+    if allowance.is_some() && !section.has("stepover") {
+        let message =
+            format!("a toolpath with an `{ALLOWANCE}` is planned by a `stepover`, and none is given");
+        let cure = "add `stepover`: no scallop height is judged of what another toolpath cuts off";
+        return Err(section.error(&section.key_span(ALLOWANCE), message, cure));
+    }
+    Ok(found)
+}
+
+/// Refuses a toolpath that leaves material on the part for none behind it.
+fn check_allowances(toolpaths: &[(&Section<'_>, ToolpathRequest)]) -> Result<(), SceneError> {
+    let follows = |k: usize| toolpaths.get(k + 1).is_some_and(|(_, next)| next.stock_is_previous);
+    let leaves = |k: &usize| toolpaths[*k].1.allowance > 0.0 && !follows(*k);
+    let Some(k) = (0..toolpaths.len()).find(leaves) else { return Ok(()) };
+    let (section, request) = &toolpaths[k];
+    let message = format!(
+        "\"{}\" leaves an allowance on the part, and no toolpath behind it cuts that off",
+        request.name
+    );
+    let cure =
+        format!("add a [[toolpath]] with `stock = \"{PREVIOUS_STOCK}\"` behind it, or delete `{ALLOWANCE}`");
+    Err(section.error(&section.key_span(ALLOWANCE), message, cure))
 }
 
 /// How passes are smoothed and joined, in the usual way where nothing is said.

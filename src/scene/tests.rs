@@ -1,5 +1,6 @@
 //! Scenes that are read, and scenes that are refused with place and cure.
 
+use cutter::Cutter;
 use proptest::prelude::*;
 
 use std::sync::Arc;
@@ -65,7 +66,7 @@ fn with(old: &str, new: &str) -> String {
 fn a_scene_becomes_typed_values_in_mm_and_rad() {
     let scene = Scene::parse("folder/wave.toml", VALID).unwrap();
     assert_eq!(scene.title, "Wave, zigzag against streamlines");
-    assert_eq!((scene.cutter.is_ball(), scene.cutter.radius()), (true, 3.0));
+    assert_eq!((scene.tooling.cutter.is_ball(), scene.tooling.cutter.radius()), (true, 3.0));
     assert_eq!(scene.tolerance, Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 });
     assert_eq!((scene.simulation.cell, scene.simulation.cell_is_auto), (0.05, true));
     assert_eq!(scene.simulation.memory_mib, 2048);
@@ -207,8 +208,7 @@ fn the_complete_scene_reads_back_as_itself() {
         let second =
             Scene::parse("wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
         assert_eq!(complete_toml(&second), complete);
-        assert_eq!(second.cutter, first.cutter);
-        assert_eq!(second.holder, first.holder);
+        assert_eq!(second.tooling, first.tooling);
         // The place of a file's name in the text is another one.
         if first.stock.file().is_none() {
             assert_eq!(second.stock, first.stock);
@@ -249,10 +249,10 @@ fn a_holder_is_read_and_refused_where_it_stands() {
     let held = |text: &str| with("[tolerance]", &format!("[holder]\n{text}\n[tolerance]"));
     let section = "[[holder.section]]\ndiameter = 27\nlength = 30";
     let scene = Scene::parse("wave.toml", held(&format!("cutting_length = 9\n{section}"))).unwrap();
-    let holder = scene.holder.unwrap();
+    let holder = scene.tooling.holder.unwrap();
     assert_eq!((holder.cutting_length(), holder.sections().len()), (9.0, 1));
     assert_eq!(holder.sections()[0].top_diameter, 27.0);
-    assert!(Scene::parse("wave.toml", VALID).unwrap().holder.is_none());
+    assert!(Scene::parse("wave.toml", VALID).unwrap().tooling.holder.is_none());
     let cases = [
         (held("cutting_length = 9"), "the holder has no section"),
         (held(section), "[holder] has no `cutting_length`"),
@@ -416,13 +416,12 @@ fn machine_coordinates_of_a_program_count_from_the_machine_s_zero() {
 
 #[test]
 fn the_auto_cell_is_a_round_number() {
-    let at = |step: Step| {
+    let of = |cutter: Cutter, step: Step| {
         let mut requests = Scene::parse("folder/wave.toml", VALID).unwrap().toolpaths;
         requests.truncate(1);
-        requests[0].step = step;
-        requests
+        (requests[0].step, requests[0].tooling.cutter) = (step, cutter);
+        auto_cell(&requests)
     };
-    let of = |cutter: Cutter, step: Step| auto_cell(&cutter, &at(step));
     let ball = |d: f64| Cutter::ball(d).unwrap();
     let cells = [0.6, 1.0, 6.0, 20.0, 400.0].map(|d| of(ball(d), Step::Scallop(0.01)));
     assert_eq!(cells, [0.01, 0.01, 0.05, 0.1, 0.5]);

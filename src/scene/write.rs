@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::read::{BLENDINGS, PREVIOUS_STOCK, SLOPE};
+use super::read::{ALLOWANCE, BLENDINGS, BOUNDARY, PREVIOUS_STOCK, REST, SLOPE, STEPDOWN};
 use super::{Scene, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock};
+use geometry::Point2;
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
 
@@ -19,8 +20,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
     part::write(out, &scene.part, scene.judged)?;
     stock::write(out, &scene.stock, scene.stock_is_stated)?;
-    write_cutter(out, scene)?;
-    write_holder(out, scene)?;
+    scene.tooling.write(out, "")?;
     let limits = &scene.tolerance;
     writeln!(out, "\n[tolerance]  # mm")?;
     writeln!(out, "scallop = {}  # planned for, and the limit of ridges", number(limits.scallop))?;
@@ -111,32 +111,29 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
                     "{SLOPE} = [{from}, {to}]  # degrees from the level, of the faces that it is made for"
                 )?;
             }
-            write_joining(out, request, scene)
+            if let Some(stepdown) = request.stepdown {
+                writeln!(out, "{STEPDOWN} = {}  # mm from level to level at most", number(stepdown))?;
+            }
+            if request.allowance > 0.0 {
+                writeln!(out, "{ALLOWANCE} = {}  # mm left on the part", number(request.allowance))?;
+            }
+            if let Some(boundary) = &request.boundary {
+                let point = |p: &Point2| format!("[{}, {}]", number(p.x), number(p.y));
+                let curve =
+                    |c: &[Point2]| format!("[{}]", c.iter().map(point).collect::<Vec<_>>().join(", "));
+                let curves: Vec<String> = boundary.curves().map(curve).collect();
+                writeln!(out, "{BOUNDARY} = [{}]  # mm, of the tool axis", curves.join(", "))?;
+            }
+            if request.rest {
+                writeln!(out, "{REST} = true  # where the toolpaths before it left too much")?;
+            }
+            write_joining(out, request)?;
+            if request.tooling == scene.tooling { Ok(()) } else { request.tooling.write(out, "toolpath.") }
         },
     )
 }
 
-fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
-    writeln!(out, "\n[cutter]  # mm, degrees")?;
-    scene.cutter.write(out)?;
-    writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
-    writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;
-    writeln!(out, "plunge_rate = {}  # mm/min", number(scene.cutting.plunge_rate))
-}
-
-fn write_holder(out: &mut String, scene: &Scene) -> std::fmt::Result {
-    let Some(holder) = &scene.holder else { return Ok(()) };
-    writeln!(out, "\n[holder]  # mm")?;
-    writeln!(out, "cutting_length = {}  # the lowest section begins there", number(holder.cutting_length()))?;
-    holder.sections().iter().try_for_each(|section| {
-        writeln!(out, "\n[[holder.section]]")?;
-        writeln!(out, "diameter = {}", number(section.diameter))?;
-        writeln!(out, "top_diameter = {}", number(section.top_diameter))?;
-        writeln!(out, "length = {}", number(section.length))
-    })
-}
-
-fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> std::fmt::Result {
+fn write_joining(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {
     if request.strategy.definition().part == PartKind::Pocket {
         return Ok(());
     }
@@ -147,7 +144,7 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
     match joining.links {
         Links::Surface => {
             writeln!(out, "links = \"surface\"  # where that is quicker than \"retract\"")?;
-            let longest = number(longest_link(joining, &scene.cutter, request.step));
+            let longest = number(longest_link(joining, &request.tooling.cutter, request.step));
             match joining.longest_link {
                 Some(_) => writeln!(out, "longest_link = {longest}  # mm")?,
                 None => writeln!(out, "longest_link = \"auto\"  # {longest} mm")?,

@@ -2,13 +2,14 @@
 //! stock is stored.
 
 mod facets;
+mod keep;
+mod layers;
 mod levels;
 mod link;
 mod lowering;
 mod moves;
 mod plan;
 mod pocket;
-mod slope;
 mod strategies;
 mod surface;
 mod tilt;
@@ -38,5 +39,5 @@ pub use tilt::tilted::Tilting;
 pub use touch_up::short_passes;
 pub use vocabulary::{
     Along, Correction, Definition, Earlier, Faces, FeedDirection, Joining, Kept, Levelled, Lines, Links,
-    PartKind, PlanError, PlanSettings, Reading, Step, Strategy, unused_tolerance,
+    PartKind, Places, PlanError, PlanSettings, Reading, Rest, Step, Strategy, unused_tolerance,
 };

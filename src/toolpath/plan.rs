@@ -4,10 +4,11 @@ use std::mem;
 use std::sync::Arc;
 
 use crate::facets::facet_charge;
+use crate::keep::{check_faces, keep_asked};
+use crate::layers::{self, Layer};
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::lowering::lowered;
-use crate::slope::{check_faces, keep_on_faces};
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
@@ -18,7 +19,7 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use field::PlannedField;
-use geometry::Point3;
+use geometry::{Aabb, Point3, Vector3};
 use machine::{Machine, machining_time, slow_corners};
 use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
@@ -111,9 +112,39 @@ fn check_extent(task: &Task<'_>) -> Result<(), PlanError> {
 
 /// Plans one path of an upright cutter.
 ///
+/// An allowance is left by the path of a cutter that is larger by it on all sides.
+///
 /// # Errors
 /// See [`PlanError`].
 pub fn plan(
+    part: &Part,
+    cutter: &Cutter,
+    strategy: &dyn Strategy,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Plan, PlanError> {
+    if settings.allowance <= 0.0 {
+        return plan_on(part, cutter, strategy, settings, monitor);
+    }
+    let (grown, below) = cutter.grown(settings.allowance).map_err(|error| PlanError::NotApplicable {
+        strategy: strategy.definition().word,
+        reason: format!("with the allowance, {error}"),
+    })?;
+    // Its tip lies so much lower than that of the cutter, and all heights with it.
+    let down = Vector3::new(0.0, 0.0, -below);
+    let lower = |block: Aabb| Aabb { min: block.min + down, max: block.max + down };
+    let settings = PlanSettings {
+        stock_top: settings.stock_top - below,
+        stock: settings.stock.map(lower),
+        ..settings.clone()
+    };
+    let mut plan = plan_on(part, &grown, strategy, &settings, monitor)?;
+    plan.path = plan.path.moved(-down);
+    Ok(plan)
+}
+
+/// As [`plan`] where nothing is left on the part.
+fn plan_on(
     part: &Part,
     cutter: &Cutter,
     strategy: &dyn Strategy,
@@ -128,7 +159,7 @@ pub fn plan(
             None => {
                 check_faces(task)?;
                 let mut passes = strategy.passes(task)?;
-                keep_on_faces(task, &mut passes)?;
+                keep_asked(task, &settings.places, &mut passes)?;
                 Arc::new(Kept::new(passes, strategy))
             }
         };
@@ -137,8 +168,23 @@ pub fn plan(
     })?;
     let further = touch_up::note(&added);
     let all = kept.passes.iter().cloned().chain(added).collect();
-    let path = join(deeper(all, cutter, settings), strategy.both_ways(), &setup)?;
+    let all = deeper(all, cutter, settings);
+    let path = join(by_levels(all, settings, monitor)?, strategy.both_ways(), &setup)?;
     Ok(Plan::again(path, kept, further.into_iter().collect()))
+}
+
+/// Passes as they are cut one layer after the other.
+fn by_levels(
+    passes: Vec<Vec<Point3>>,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Layer>, PlanError> {
+    let Some(stepdown) = settings.stepdown else { return Ok(vec![Layer::whole(passes)]) };
+    let levels = layers::count(&passes, settings.stock_top, stepdown);
+    if levels > layers::MOST_LEVELS {
+        return Err(PlanError::TooManyLevels { stepdown, levels });
+    }
+    Ok(layers::layers(&passes, settings.stock_top, stepdown, monitor)?)
 }
 
 /// Passes of an upright cutter, deeper beside places where an earlier plan left a little too much.
@@ -248,7 +294,8 @@ fn duration(
 ) -> Result<f64, PlanError> {
     let machine = Machine { jerks: [f64::INFINITY; 3], ..setup.settings.machine };
     let settings = &PlanSettings { chord_tolerance, machine, ..setup.settings.clone() };
-    let mut path = join(passes.passes.clone(), both_ways, &Setup { settings, ..*setup })?;
+    let passes = vec![Layer::whole(passes.passes.clone())];
+    let mut path = join(passes, both_ways, &Setup { settings, ..*setup })?;
     if machine.slow_corners {
         path = slow_corners(&path, &machine);
     }

@@ -127,3 +127,158 @@ fn what_has_no_previous_stock_says_so() {
     let reason = report["toolpaths"][1]["reason"].as_str().unwrap();
     assert!(code == Some(1) && reason.contains("measured on a block of its own"), "{reason}");
 }
+
+/// A larger cutter roughs by levels and leaves the same everywhere over a part with a hollow and a dome: no
+/// move comes nearer, and the flat of the dome's top tells that none keeps farther away.
+#[test]
+fn roughing_has_its_own_cutter_and_leaves_an_allowance() {
+    const PART: &str = "[part]\nsurface = \"pit_and_crest\"\nx = [20, 50]\ny = [20, 50]\n\
+                        [cutter]\nshape = \"ball\"\ndiameter = 6\n[stock]\nallowance = 4\n";
+    const ROUGH: &str = "[[toolpath]]\nname = \"rough\"\nstrategy = \"zigzag\"\nstepover = 3\nstepdown = 2\n\
+                         allowance = 0.3\n[toolpath.cutter]\nshape = \"bull\"\ndiameter = 8\ncorner_radius = 2\n\
+                         feed_rate = 2000\n";
+    let home = tempfile::tempdir().unwrap();
+    let (code, report) = run(
+        home.path(),
+        &format!("{PART}{ROUGH}[[toolpath]]\nname = \"finish\"\nstrategy = \"zigzag\"\n{PREVIOUS}"),
+    );
+    assert_eq!(code, Some(0), "{report}");
+    let [rough, finish] = [0, 1].map(|k| &report["toolpaths"][k]);
+    // Chords of the path may cut a micrometre into it.
+    let least = number(rough, "/deviation/min_mm");
+    assert!((0.299..0.31).contains(&least), "{least}");
+    assert_eq!(number(rough, "/gouge/max_depth_mm"), 0.0, "{}", rough["gouge"]);
+    assert!(number(finish, "/excess/max_mm") <= 0.01, "{}", finish["excess"]);
+    // Nobody holds against the target what the finish cuts off.
+    assert_eq!(rough["scallop"]["over_target_fraction"], Value::Null, "{}", rough["scallop"]);
+    let text =
+        |name: &str| std::fs::read_to_string(home.path().join(format!("out/{name}/toolpath.nc"))).unwrap();
+    assert!(
+        text("rough").contains("BULL NOSE D=8.0 R=2.0") && text("rough").contains("F2000"),
+        "{}",
+        text("rough")
+    );
+    assert!(text("finish").contains("BALL END D=6.0") && !text("finish").contains("F2000"));
+    // A complete scene says the same.
+    let checked = millstream(home.path(), &["check", "scene.toml"]).stdout;
+    for line in ["[toolpath.cutter]", "corner_radius = 2.0", "stepdown = 2.0", "allowance = 0.3"] {
+        assert!(checked.contains(line), "{line}: {checked}");
+    }
+    std::fs::write(home.path().join("scene.toml"), &checked).unwrap();
+    let again = millstream(home.path(), &["check", "scene.toml"]).stdout;
+    let scene = |text: &str| text[text.find("title").unwrap()..].to_owned();
+    assert_eq!(scene(&again), scene(&checked));
+}
+
+/// A level plate under 3 mm of stock: three levels of 1 mm, and the cutter never meets more.
+#[test]
+fn levels_are_no_deeper_than_the_stepdown() {
+    let home = tempfile::tempdir().unwrap();
+    let plate = PLATE.replace("[simulation]", "[stock]\nallowance = 3\nmargin = 0\n[simulation]");
+    let flat = "[toolpath.cutter]\nshape = \"flat\"\ndiameter = 5\n";
+    let levels = format!("{}stepdown = 1.2\n{flat}", ROUGH.replace("stepover = 2", "stepover = 4"));
+    let (code, report) = run(home.path(), &format!("{plate}{levels}"));
+    assert_eq!(code, Some(0), "{report}");
+    let rough = &report["toolpaths"][0];
+    assert!((number(rough, "/removal/max_axial_engagement_mm") - 1.0).abs() < 1e-4, "{}", rough["removal"]);
+    let program = std::fs::read_to_string(home.path().join("out/rough/toolpath.nc")).unwrap();
+    for level in ["Z2.0", "Z1.0", "Z0.0"] {
+        assert!(program.contains(level), "{program}");
+    }
+}
+
+#[test]
+fn roughing_that_cannot_be_meant_is_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let refused = |scene: &str, text: &str| {
+        std::fs::write(home.path().join("scene.toml"), scene).unwrap();
+        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+        assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+        assert!(answer.stderr.contains(text), "{}", answer.stderr);
+    };
+    let leaving = format!("{ROUGH}allowance = 0.2\n");
+    refused(&format!("{PLATE}{leaving}{FINISH}"), "no toolpath behind it cuts that off");
+    refused(&format!("{PLATE}{leaving}"), "no toolpath behind it cuts that off");
+    let by_height = leaving.replace("stepover = 2\n", "");
+    refused(&format!("{PLATE}{by_height}{FINISH}{PREVIOUS}"), "is planned by a `stepover`");
+    refused(&format!("{PLATE}{ROUGH}stepdown = 1\naxis = {{ lead = 10 }}\n"), "does not apply beside `axis`");
+    refused(&format!("{PLATE}{ROUGH}stepdown = 1e-6\n"), "set a greater one");
+    let holder = "holder = { cutting_length = 9, section = [{ diameter = 9, length = 30 }] }\n";
+    refused(&format!("{PLATE}{ROUGH}{holder}"), "`holder` in a toolpath without `cutter`");
+    let cutter = "cutter = { shape = \"flat\", diameter = 8 }\n";
+    let held = PLATE.replace(
+        "[simulation]",
+        &format!(
+            "[holder]\n{}\n[simulation]",
+            "cutting_length = 9\nsection = [{ diameter = 9, length = 30 }]"
+        ),
+    );
+    refused(&format!("{held}{ROUGH}{cutter}"), "it would go unchecked");
+    refused(
+        &format!("{PLATE}{ROUGH}{}", cutter.replace("}", ", feed_rate = 90000 }")),
+        "more than the machine's `rapid_rate`",
+    );
+}
+
+/// Hollows of a radius of 2.3 mm: a ball of 4 mm radius leaves 0.1 mm in them, one of 1.5 mm cuts that off and
+/// goes nowhere else.
+#[test]
+fn a_small_cutter_cuts_the_rest_alone() {
+    const PART: &str = "[part]\nsurface = \"wave\"\namplitude = 0.4\nwavelength_x = 6\nwavelength_y = 1000\nx = [0, 12]\n\
+                        y = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 8\n[tolerance]\nscallop = 0.02\n\
+                        [[toolpath]]\nname = \"finish\"\nstrategy = \"zigzag\"\ncorrect = false\n";
+    let small = "strategy = \"zigzag\"\nangle = 90\ncutter = { shape = \"ball\", diameter = 3 }\n";
+    let home = tempfile::tempdir().unwrap();
+    let rest = format!("[[toolpath]]\nname = \"rest\"\n{PREVIOUS}rest = true\n{small}");
+    let whole = format!("[[toolpath]]\nname = \"whole\"\n{small}");
+    let (_, report) = run(home.path(), &format!("{PART}{rest}{whole}"));
+    let [finish, rest, whole] = [0, 1, 2].map(|k| &report["toolpaths"][k]);
+    assert!(number(finish, "/excess/max_mm") > 0.1, "{}", finish["excess"]);
+    assert_eq!([&rest["verdict"], &whole["verdict"]], ["pass", "pass"], "{report}");
+    let length = |toolpath: &Value| number(toolpath, "/path/cutting_length_mm");
+    assert!(length(rest) < 0.5 * length(whole), "{} {}", length(rest), length(whole));
+    // On the crests, at x = 1.5 and 7.5, the large ball has done its work.
+    let program = std::fs::read_to_string(home.path().join("out/rest/toolpath.nc")).unwrap();
+    let places = program.lines().filter_map(|line| line.split(' ').find_map(|word| word.strip_prefix('X')));
+    let from_crest = |x: &str| {
+        (x.parse::<f64>().unwrap() - 1.5)
+            .rem_euclid(6.0)
+            .min((1.5 - x.parse::<f64>().unwrap()).rem_euclid(6.0))
+    };
+    let nearest = places.map(from_crest).fold(f64::INFINITY, f64::min);
+    assert!(nearest > 0.8, "{nearest}");
+}
+
+/// Two toolpaths share a plate at x = 6; around an island nothing is cut by the first.
+#[test]
+fn a_boundary_keeps_the_axis_within() {
+    let home = tempfile::tempdir().unwrap();
+    let left = "boundary = [[[-9, -9], [6, -9], [6, 17], [-9, 17]], [[2, 2], [4, 2], [4, 6], [2, 6]]]\n";
+    let right = "boundary = [[[5.9, -9], [21, -9], [21, 17], [5.9, 17]], [[1.9, 1.9], [4.1, 1.9], [4.1, 6.1], [1.9, 6.1]]]\n";
+    let stage = |name: &str, more: &str| {
+        format!("[[toolpath]]\nname = \"{name}\"\nstrategy = \"zigzag\"\nangle = 90\nscallop = 0.01\n{more}")
+    };
+    let scene = format!("{PLATE}{}{}", stage("left", left), stage("right", &format!("{right}{PREVIOUS}")));
+    let (code, report) = run(home.path(), &scene);
+    assert_eq!(code, Some(0), "{report}");
+    let program = std::fs::read_to_string(home.path().join("out/left/toolpath.nc")).unwrap();
+    let farthest = program.lines().filter_map(|line| line.split(' ').find_map(|word| word.strip_prefix('X')));
+    let farthest = farthest.map(|x| x.parse::<f64>().unwrap()).fold(f64::NEG_INFINITY, f64::max);
+    assert!(farthest <= 6.0, "{farthest}");
+    // Alone it leaves the rest of the plate and the island.
+    let (code, report) = run(home.path(), &format!("{PLATE}{}", stage("left", left)));
+    assert_eq!(code, Some(1), "{report}");
+    let checked = millstream(home.path(), &["check", "scene.toml"]).stdout;
+    std::fs::write(home.path().join("scene.toml"), &checked).unwrap();
+    assert_eq!(millstream(home.path(), &["check", "scene.toml"]).stdout, checked);
+    assert!(checked.contains("boundary = [[[-9.0, -9.0]"), "{checked}");
+    for (bad, text) in [
+        ("boundary = [[[0, 0], [4, 4], [4, 0], [0, 4]]]\n", "neither cross nor touch"),
+        ("rest = true\n", "the rest is what the toolpaths before it left"),
+    ] {
+        std::fs::write(home.path().join("scene.toml"), format!("{PLATE}{}", stage("bad", bad))).unwrap();
+        let answer = millstream(home.path(), &["run", "scene.toml"]);
+        let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(answer.code == Some(2) && words.contains(text), "{words}");
+    }
+}

@@ -149,7 +149,7 @@ impl Maps<'_> {
             return self.laid_flat("", ["x", "y"], spacing, &plan_view(map, spacing), &lines);
         }
         let contacts =
-            contacts_on_patches(&self.session.part, &self.session.scene.cutter, &self.outcome.path);
+            contacts_on_patches(&self.session.part, self.outcome.cutters.first(), &self.outcome.path);
         let mut first: Option<ToolpathPage> = None;
         for (k, patch) in map.grids.iter().enumerate() {
             let number = if map.grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };

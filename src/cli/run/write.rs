@@ -39,10 +39,10 @@ pub fn toolpath(
 
 /// Writes toolpath.cls, and toolpath.nc where there is a program.
 fn programs(session: &Session, outcome: &Outcome, outputs: &Outputs) -> Result<(), CliError> {
-    let (folder, header) = (&outcome.result.folder, session.header(&outcome.result.name));
-    let cutters = &outcome.cutters;
+    let Outcome { cutters, header, .. } = outcome;
+    let folder = &outcome.result.folder;
     outputs
-        .file(&format!("{folder}/toolpath.cls"), |out| apt_cl::write(out, &outcome.path, cutters, &header))?;
+        .file(&format!("{folder}/toolpath.cls"), |out| apt_cl::write(out, &outcome.path, cutters, header))?;
     if session.has_program(outcome) {
         outputs.file(&format!("{folder}/toolpath.nc"), |out| session.write_program(out, outcome))?;
     }

@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Of every toolpath.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let (scene, path) = (run.scene(), run.path());
+    let (scene, path, cutting) = (run.scene(), run.path(), &run.tooling().cutting);
     // The feeds of a program from elsewhere are its own, as far as the machine can run them.
     if let Some(read) = run.request.foreign() {
         let place = |line: u32| format!("in line {line} of {}", path.program_name());
@@ -25,12 +25,12 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let line = |k: usize| format!("at move {k}{}", run.program_line(k as u32));
     let mut claims = vec![
-        fast_enough(path, &scene.cutting, &scene.machine, &line),
-        no_faster(path, &scene.cutting, &scene.machine, &line),
-        down_no_faster(path, scene.cutting.plunge_rate, &line),
+        fast_enough(path, cutting, &scene.machine, &line),
+        no_faster(path, cutting, &scene.machine, &line),
+        down_no_faster(path, cutting.plunge_rate, &line),
     ];
     let time = run.planned.time(scene, monitor)?;
-    claims.push(in_time(time, longest(path, &scene.cutting, &scene.machine) + run.planned.joint_time(scene)));
+    claims.push(in_time(time, longest(path, cutting, &scene.machine) + run.planned.joint_time(scene)));
     Ok(Finding { claims, ..Finding::default() })
 }
 

@@ -174,7 +174,7 @@ fn most_left(
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let cutters = run.cutters();
-    if cutters.are_several() {
+    if cutters.are_several() || run.session.leaves_the_rest(run.request) {
         return Ok(Finding::default());
     }
     let (path, measurement) = (run.path(), run.measurement());
@@ -270,7 +270,7 @@ mod tests {
                     [[toolpath]]\nstrategy = \"zigzag\"\n";
         let session = Session::new(Scene::parse("hollows.toml", text).unwrap()).unwrap();
         let left = |at: [f64; 3]| {
-            let cutter = &session.scene.cutter;
+            let cutter = &session.scene.tooling.cutter;
             let left = LeastLeftFigures::at_or_elsewhere(&session, cutter, &[(at.into(), 0.027)], &Silent);
             left.unwrap().unwrap_or_else(|| panic!("nothing is left at {at:?}"))
         };

@@ -26,7 +26,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         OffsetDrive::Given(surfaces) => Some(surfaces.as_slice()),
         OffsetDrive::Exact | OffsetDrive::InPlane | OffsetDrive::Published => None,
     };
-    let Some(offset) = offset_figures(run.part(), run.scene().cutter.radius(), given) else {
+    let Some(offset) = offset_figures(run.part(), run.tooling().cutter.radius(), given) else {
         return Ok(Finding::default());
     };
     let figure = Figure { key: "offset", value: value(&offset)?, rows: rows(&offset), ..Figure::default() };

@@ -22,7 +22,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let mut claims = vec![within_walls(run, &p), cut_to_walls(run, &p)];
     let strategy = run.request.strategy.downcast_ref::<PocketStrategy>();
     if let (Some(strategy), Some(engaged)) = (strategy, &run.planned.engaged) {
-        let (step, radius) = (run.request.step, run.scene().cutter.radius());
+        let (step, radius) = (run.request.step, run.tooling().cutter.radius());
         let thinly = run.planned.engaged_thinly.as_ref();
         let engagement = engagement_figures(strategy, step, path, radius, engaged, thinly);
         p.stepover_mm = Some(strategy.stepover(step, radius));
@@ -213,7 +213,8 @@ fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
 /// That no way down through stock is steeper than the scene allows.
 fn ramps(run: &Run<'_>, pocket: &Pocket, strategy: &PocketStrategy) -> Claim {
     let limit = strategy.ramp_angle.to_degrees();
-    let before = StockBefore::new(run.path(), run.scene().cutter.radius(), &run.session.stock, pocket.free());
+    let before =
+        StockBefore::new(run.path(), run.tooling().cutter.radius(), &run.session.stock, pocket.free());
     let stands = |k: usize| before.stands_under(k);
     let (steepest, at_least, index) = steepest(run.path(), run.session.top(), limit, &stands);
     let text = match index {

@@ -171,9 +171,9 @@ fn by_voxels(
     unseen: &mut Option<InStock>,
     monitor: &dyn Monitor,
 ) -> Result<(RemovalFigures, Vec<MoveRemoval>), JobError> {
-    let (scene, stock) = (run.scene(), run.session.roughed_stock());
+    let stock = run.session.roughed_stock();
     let voxel = voxel_in_order(run, &stock);
-    let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+    let cutter = Solid::of_cutter(&run.tooling().cutter, run.tooling().holder.as_ref());
     let engine = VoxelEngine::new(&stock, &cutter, run.path()).map_err(run.voxels())?;
     let removed = engine.removal(voxel, monitor).map_err(run.voxels())?;
     let mut figures = voxel_removal_figures(run.path(), &removed, voxel);

@@ -76,7 +76,8 @@ fn sentence(run: &Run<'_>, ra: &str, rz: &str) -> (&'static str, String) {
 fn measure(run: &Run<'_>, cut: &dyn FirstCut, monitor: &dyn Monitor) -> Result<RoughnessFigures, JobError> {
     let (scene, path) = (run.scene(), &*run.whole.path);
     let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
-    let block = run.session.task(path, &scene.simulation, &run.session.cells).block();
+    let block =
+        run.session.task(run.request, (path, run.cutters()), &scene.simulation, &run.session.cells).block();
     let cut = SweptVolume {
         part: run.part(),
         cut,

@@ -20,7 +20,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     if run.cutters().are_several() {
         return Ok(Finding::default());
     }
-    let (cutter, pairs) = (&run.scene().cutter, &run.measurement().pairs);
+    let (cutter, pairs) = (&run.tooling().cutter, &run.measurement().pairs);
     let found = polynomial_figures(run.part(), cutter, &run.whole.path, pairs, monitor)?;
     let Some(found) = found else { return Ok(Finding::default()) };
     let [mean, max] = [found.mean_mm, found.max_mm].map(|height| micrometres(Some(height)));

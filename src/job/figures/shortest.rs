@@ -51,21 +51,25 @@ impl ShortestFigures {
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let length = path_figures(run.path(), 0.0).cutting_length_mm;
     let (scene, planned) = (run.scene(), run.planned);
-    // Tools that lean take other strips, a path for some slopes covers a part of the whole, and nobody
-    // planned a program from elsewhere for a scallop height.
+    // Tools that lean take other strips, a path for some places covers a part of the whole, one by levels covers
+    // it more than once, and nobody planned a program from elsewhere for a scallop height.
     let request = run.request;
-    let covers_all = request.axis.is_none() && request.faces() == Faces::ALL && request.foreign().is_none();
+    let covers_all = request.axis.is_none()
+        && request.faces() == Faces::ALL
+        && !request.is_for_places()
+        && request.stepdown.is_none()
+        && request.foreign().is_none();
     let (true, Step::Scallop(height)) = (covers_all && run.session.pocket.is_none(), request.step) else {
         return Ok(Finding::default());
     };
-    let shortest = match run.session.shortest_possible(height, monitor) {
+    let shortest = match run.session.shortest_possible(&request.tooling.cutter, height, monitor) {
         Err(PlanError::Cancelled(cancelled)) => return Err(cancelled.into()),
         // No smooth surface can be fitted to the part: its directions are unknown.
         Err(_) => return Ok(Finding::default()),
         Ok(shortest) => shortest,
     };
     let time = planned.time(scene, monitor)?;
-    let shortest = ShortestFigures::new(&shortest, length, scene.cutting.feed_rate, time);
+    let shortest = ShortestFigures::new(&shortest, length, request.tooling.cutting.feed_rate, time);
     let Some(s) = shortest else { return Ok(Finding::default()) };
     let per_cent = 100.0 * s.efficiency;
     let name = &run.request.name;

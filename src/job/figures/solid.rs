@@ -41,7 +41,7 @@ const OPEN: &str = "beside the borders of an open surface nothing bounds what wa
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(voxel) = run.scene().simulation.voxel else { return Ok(Finding::default()) };
     let stock = run.session.roughed_stock();
-    let tool = Solid::of_cutter(&run.scene().cutter, run.scene().holder.as_ref());
+    let tool = Solid::of_cutter(&run.tooling().cutter, run.tooling().holder.as_ref());
     let memory = run.budget().left(0);
     let engine = VoxelEngine::new(&stock, &tool, run.path()).map_err(run.voxels())?;
     let voxels = engine.cut(voxel, memory, monitor).map_err(run.voxels())?;

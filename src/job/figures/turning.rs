@@ -12,7 +12,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let Some(axis) = &run.request.axis else {
         return Ok(Finding::default());
     };
-    let (part, cutter, path) = (run.part(), &run.scene().cutter, run.path());
+    let (part, cutter, path) = (run.part(), &run.tooling().cutter, run.path());
     let mut claims = Vec::new();
     if let Some(limit) = axis.most_turning {
         let found = fastest_turn(part, cutter, path, monitor)?;

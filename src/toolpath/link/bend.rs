@@ -228,8 +228,8 @@ fn turn_beside(interval: f64, tangents: f64, from: &End, to: &End, ahead: f64, s
 }
 
 impl Bends<'_> {
-    /// The moves after the last tip of one pass up to and with the first one of the next; `None` where a link
-    /// would be too long, or leave the part.
+    /// The moves after the last tip of one pass up to and with the first one of the next, no lower than the
+    /// `floor`, mm; `None` where a link would be too long, or leave the part.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -240,6 +240,7 @@ impl Bends<'_> {
         &self,
         before: &[Point3],
         after: &[Point3],
+        floor: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Point3>>, Cancelled> {
         let (from, to) = (End::last(before), End::first(after));
@@ -270,7 +271,7 @@ impl Bends<'_> {
             if about >= least || length / speed >= least {
                 continue;
             }
-            if let Some(moves) = self.follow(&curve, length, &from, &to, monitor)? {
+            if let Some(moves) = self.follow((&curve, length), [&from, &to], floor, monitor)? {
                 let time = self.time(&ways, &moves, monitor)?;
                 if time < least {
                     best = Some((time, moves));
@@ -324,10 +325,9 @@ impl Bends<'_> {
     /// The moves along some cubics that follow each other.
     fn follow(
         &self,
-        curve: &[Cubic],
-        length: f64,
-        from: &End,
-        to: &End,
+        (curve, length): (&[Cubic], f64),
+        [from, to]: [&End; 2],
+        floor: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Point3>>, Cancelled> {
         let (mut stays, mut beside) = (true, Beside::default());
@@ -340,7 +340,7 @@ impl Bends<'_> {
                     || self.border.rolled(self.cutter, &p, &d.contact) <= MOST_ROLL * self.interval
             });
             stays &= drop.is_some();
-            drop.map(|d| Point3::new(p.x, p.y, d.tip_z))
+            drop.map(|d| Point3::new(p.x, p.y, d.tip_z.max(floor)))
         };
         let mut watch = Watch::new(monitor);
         let fine = SAMPLING_SHARE * self.chord_tolerance;

@@ -28,6 +28,7 @@ mod order;
 mod tests;
 mod tilted;
 
+use crate::layers::Layer;
 use crate::surface::border::Border;
 use crate::vocabulary::{Joining, Links, PlanSettings, Setup, Step};
 use bend::{Bends, End};
@@ -69,18 +70,13 @@ pub fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
     }
 }
 
-/// Joins passes. Each is a run of at least two tip positions without repeats; passes of fewer are left
-/// out. Without `both_ways` each keeps its direction.
+/// Joins passes, layer by layer. Each is a run of at least two tip positions without repeats; passes of fewer
+/// are left out. Without `both_ways` each keeps its direction.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
-pub(crate) fn join(
-    passes: Vec<Vec<Point3>>,
-    both_ways: bool,
-    setup: &Setup<'_>,
-) -> Result<Toolpath, Cancelled> {
+pub(crate) fn join(layers: Vec<Layer>, both_ways: bool, setup: &Setup<'_>) -> Result<Toolpath, Cancelled> {
     let Setup { part, cutter, settings, monitor } = *setup;
-    let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
     let rates = Speeds::of(settings);
     let longest = match settings.joining.links {
@@ -94,9 +90,15 @@ pub(crate) fn join(
         start: &|place| rates.start(settings, place, sides.as_ref()),
         finish: &|place| rates.ascent(settings, place),
     };
-    let visits = order(&passes, both_ways, costs);
-    monitor::check(monitor)?;
-    let passes = in_order(passes, &visits, both_ways);
+    // The passes in order, and the floor of each.
+    let (mut passes, mut floors) = (Vec::new(), Vec::new());
+    for Layer { floor, passes: mut own } in layers {
+        own.retain(|pass| pass.len() >= 2);
+        let visits = order(&own, both_ways, costs);
+        monitor::check(monitor)?;
+        passes.append(&mut in_order(own, &visits, both_ways));
+        floors.resize(passes.len(), floor);
+    }
     let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
     let mut way_in = None;
     if on_surface && !passes.is_empty() {
@@ -117,8 +119,12 @@ pub(crate) fn join(
             machine: &Machine { jerks: [f64::INFINITY; 3], ..settings.machine },
             feed_rate: settings.feed_rate,
         };
-        links =
-            work::parallel::try_map(passes.len() - 1, |k| bends.link(&passes[k], &passes[k + 1], monitor))?;
+        links = work::parallel::try_map(passes.len() - 1, |k| {
+            if floors[k] != floors[k + 1] {
+                return Ok(None);
+            }
+            bends.link(&passes[k], &passes[k + 1], floors[k], monitor)
+        })?;
     }
     let mut program = Program::new(&passes, cutter, settings, rates);
     if let Some(way) = way_in {

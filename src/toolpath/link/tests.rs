@@ -45,7 +45,7 @@ fn line(a: [f64; 2], b: [f64; 2]) -> Vec<Point3> {
 fn join_with(passes: &[Vec<Point3>], both_ways: bool, part: &Part, settings: &PlanSettings) -> Toolpath {
     let cutter = Cutter::ball(6.0).unwrap();
     let setup = Setup { part, cutter: &cutter, settings, monitor: &Silent };
-    join(passes.to_vec(), both_ways, &setup).unwrap()
+    join(vec![Layer::whole(passes.to_vec())], both_ways, &setup).unwrap()
 }
 
 fn joined(part: &Part, passes: &[Vec<Point3>], both_ways: bool, links: Links) -> Toolpath {

@@ -43,6 +43,14 @@ pub enum PlanError {
         /// Size of the part along y, mm.
         y: f64,
     },
+    /// The stepdown is too small for the stock.
+    #[error("a `stepdown` of {stepdown} mm makes {levels} levels; set a greater one, and check its unit")]
+    TooManyLevels {
+        /// What was asked for, mm.
+        stepdown: f64,
+        /// How many levels that makes.
+        levels: f64,
+    },
 }
 
 impl PlanError {

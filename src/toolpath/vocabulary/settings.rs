@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{Correction, Faces, Kept};
+use super::{Correction, Faces, Kept, Places};
 use crate::lowering::Lowered;
 use geometry::{Aabb, Point3};
 use machine::Machine;
@@ -72,6 +72,13 @@ pub struct PlanSettings {
     pub joining: Joining,
     /// Which faces are to have passes.
     pub faces: Faces,
+    /// Where else passes of an upright tool are to be.
+    pub places: Places,
+    /// How far levels lie apart at most, mm, where an upright tool goes down from the top of the stock by
+    /// levels; `None` cuts all in one step down.
+    pub stepdown: Option<f64>,
+    /// What an upright tool leaves on the part everywhere, mm.
+    pub allowance: f64,
     /// Whether what chords leave above the scallop height is measured and moves beside it go deeper then
     /// ([`Earlier::lowered`]): passes lie as far apart as if chords raised nothing.
     pub is_lowered_later: bool,
@@ -135,6 +142,9 @@ impl Default for PlanSettings {
             machine: Machine::default(),
             joining: Joining::default(),
             faces: Faces::default(),
+            places: Places::default(),
+            stepdown: None,
+            allowance: 0.0,
             is_lowered_later: false,
             memory: MEMORY,
             earlier: None,

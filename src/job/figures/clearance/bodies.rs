@@ -104,7 +104,7 @@ fn motions<'a>(run: &'a Run<'a>) -> (Vec<Motion<'a>>, Option<String>) {
             let (known, unknown): (Vec<_>, Vec<_>) = tools.iter().partition(|tool| length(tool).is_some());
             let motions = known.into_iter().filter_map(|tool| {
                 let chain = Chain::three_axes(length(tool)?, made.chain.workpiece_zero());
-                let program = program_of_three_axes(&tool.path, run.planned.rise_to, &chain);
+                let program = program_of_three_axes(&tool.path, run.planned.header.rise_to, &chain);
                 Some(motion(tool, chain, program))
             });
             let text = unknown.first().map(|tool| {

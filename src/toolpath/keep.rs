@@ -1,18 +1,18 @@
-//! Passes over the faces of some slopes alone: of a part with level ground and walls, each strategy takes
-//! what suits it.
+//! Passes where they are asked for alone: on faces of some slopes, within a boundary, and where toolpaths before
+//! left too much. Of a part with level ground and walls each strategy takes what suits it, and a small cutter
+//! what a larger one could not reach.
 //!
-//! Enters: the passes of an upright cutter over all that its strategy covers. Leaves: their stretches on
-//! which the cutter touches faces of these slopes, or would from an interval beside: there the passes end,
-//! and others of other slopes begin.
+//! Enters: the passes of an upright cutter over all that its strategy covers. Leaves: their stretches on which
+//! the cutter touches such places, or would from an interval beside: there the passes end, and others begin.
 
 use std::f64::consts::TAU;
 use std::mem;
 
 use crate::link::plane_interval;
-use crate::vocabulary::{Faces, Passes, PlanError, Task};
+use crate::vocabulary::{Faces, Passes, Places, PlanError, Rest, Task};
 use cutter::Cutter;
 use drop_cutter::{Drop, DropCutter};
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Region, Vector2};
 use part::Part;
 use work::monitor::{self, Cancelled};
 
@@ -29,24 +29,27 @@ pub(crate) fn check_faces(task: &Task<'_>) -> Result<(), PlanError> {
     if has_any { Ok(()) } else { Err(PlanError::NoSuchSlope) }
 }
 
-/// Leaves of passes what serves the faces that are asked for.
+/// Leaves of passes what serves the places that are asked for.
 ///
 /// # Errors
 /// When cancelled.
-pub(crate) fn keep_on_faces(task: &Task<'_>, passes: &mut Passes) -> Result<(), PlanError> {
+pub(crate) fn keep_asked(task: &Task<'_>, places: &Places, passes: &mut Passes) -> Result<(), PlanError> {
     let Task { part, monitor, ref settings, .. } = *task;
     let faces = settings.faces;
-    if faces == Faces::ALL {
+    if faces == Faces::ALL && *places == Places::default() {
         return Ok(());
     }
     let dropped = task.dropped();
+    let interval = plane_interval(dropped, settings.step);
     let served = Served {
         part,
         drop: DropCutter::watched(part, dropped, monitor)?,
         cutter: dropped,
         faces,
+        boundary: places.boundary.as_deref(),
+        rest: places.rest.as_deref().map(|rest| rest.grown(interval)),
         chord_tolerance: settings.chord_tolerance,
-        interval: plane_interval(dropped, settings.step),
+        interval,
     };
     let all = mem::take(&mut passes.passes);
     let kept = work::parallel::try_map(all.len(), |k| {
@@ -58,12 +61,15 @@ pub(crate) fn keep_on_faces(task: &Task<'_>, passes: &mut Passes) -> Result<(), 
     Ok(())
 }
 
-/// Where passes serve faces of some slopes.
+/// Where passes serve what is asked for.
 struct Served<'a> {
     part: &'a Part,
     drop: DropCutter<'a>,
     cutter: &'a Cutter,
     faces: Faces,
+    boundary: Option<&'a Region>,
+    /// What is left, and an interval beside.
+    rest: Option<Rest>,
     /// Of the passes, mm: beside the foot of a wall they may touch nothing.
     chord_tolerance: f64,
     /// Between passes, mm.
@@ -111,8 +117,20 @@ impl Served<'_> {
         found
     }
 
-    /// Whether the cutter with its axis there touches such a face, or would an interval beside.
+    /// Whether the cutter with its axis there is within the boundary and touches such a place, or would an
+    /// interval beside.
     fn serves(&self, axis: Point2) -> bool {
+        self.boundary.is_none_or(|boundary| boundary.contains(&axis))
+            && self.rest.as_ref().is_none_or(|rest| self.touches_rest(axis, rest))
+            && (self.faces == Faces::ALL || self.serves_faces(axis))
+    }
+
+    /// Of a cutter that touches at several places one tells for all: between them something is left as well.
+    fn touches_rest(&self, axis: Point2, rest: &Rest) -> bool {
+        self.drop.at(axis.x, axis.y).is_some_and(|rests| rest.stands(&rests.contact.point.xy()))
+    }
+
+    fn serves_faces(&self, axis: Point2) -> bool {
         let touches = |axis: Point2| {
             self.drop.at(axis.x, axis.y).is_some_and(|rests| self.faces.contain(self.upright(axis, &rests)))
         };
