@@ -25,4 +25,6 @@ pub use error::ScallopError;
 pub use place::SurfaceCurvature;
 pub use section::{BallSection, ScallopStep, ball_scallop_height};
 pub use section_fit::{DEFAULT_DEGREE, MAX_DEGREE, SectionFit, SectionFrame, fit_section};
-pub use strip::{FeedCurvature, cut_ahead, least_gap, strip_width, strip_width_at, widest_strip_at};
+pub use strip::{
+    FeedCurvature, cut_ahead, least_gap, strip_width, strip_width_at, strip_width_fed, widest_strip_at,
+};

@@ -144,6 +144,20 @@ pub fn widest_strip_at(
     width_within(2.0 * cutter.radius(), cutter, n, b, surface, h)
 }
 
+/// As [`strip_width_at`], where it is the cutter that is fed straight, not its contact: it sweeps a cylinder,
+/// which touches the surface along the tangent that is conjugate to the feed on the cutter. A twist of the
+/// surface then turns the contacts away from the feed, and widens no strip.
+pub fn strip_width_fed(
+    cutter: &Cutter,
+    n: &Vector3,
+    b: &Vector3,
+    surface: &FeedCurvature,
+    h: f64,
+) -> (f64, bool) {
+    let across = surface.at(bend_of(cutter, n, b).ahead());
+    width_over(WIDEST_OVER_DIAMETER * 2.0 * cutter.radius(), cutter, n, b, across, h)
+}
+
 /// [`strip_width_at`], `most` mm at most.
 fn width_within(
     most: f64,
@@ -153,9 +167,14 @@ fn width_within(
     surface: &FeedCurvature,
     h: f64,
 ) -> (f64, bool) {
-    let bend = bend_of(cutter, n, b);
     // An edge shows no meridian to compare.
-    let surface = if cutter.touches_with_edge(n) { surface.across } else { untwisted(&bend, surface) };
+    let surface =
+        if cutter.touches_with_edge(n) { surface.across } else { untwisted(&bend_of(cutter, n, b), surface) };
+    width_over(most, cutter, n, b, surface, h)
+}
+
+/// The width of the strip over a surface without twist, of a curvature across the feed.
+fn width_over(most: f64, cutter: &Cutter, n: &Vector3, b: &Vector3, surface: f64, h: f64) -> (f64, bool) {
     if cutter.is_ball() {
         return strip_width(1.0 / cutter.radius(), surface, h, cutter.radius());
     }
@@ -166,7 +185,7 @@ fn width_within(
         if on_plane.is_nan() { of_ball } else { (WIDEST_OVER_PLANE * on_plane).clamp(of_ball, most) }
     };
     // A point has no curvature to compare: it leaves grooves.
-    let curvature = bend.across;
+    let curvature = bend_of(cutter, n, b).across;
     let too_concave = curvature.is_finite() && too_concave(curvature, surface);
     if surface > 0.0 && curvature <= surface && !cutter.touches_with_edge(n) {
         // A flat end stands over a hollow by its sides.
@@ -229,38 +248,45 @@ mod tests {
         assert!(width > 0.1 && width < 1.0, "{width}");
     }
 
-    /// Passes over `z = 0.35 x + 0.1 y + c x y` with contacts at constant y, one at 0 and one so that they
-    /// are `width` apart on the surface at x = 0: the ridge between them over its normal, by brute force.
-    fn ridge_over_twist(cutter: &Cutter, c: f64, y: f64) -> f64 {
-        let z = |x: f64, y: f64| 0.35 * x + 0.1 * y + c * x * y;
-        let normal = |x: f64, y: f64| Vector3::new(-0.35 - c * y, -0.1 - c * x, 1.0).normalize();
-        let tips = |y: f64| {
-            let at = move |k: i32| {
-                let x = f64::from(k) * 2e-4;
-                let n = normal(x, y);
-                Vector3::new(x, y, z(x, y)) + cutter.contact_to_tip(&n)
-            };
-            (-4000..=4000).map(at).collect::<Vec<_>>()
-        };
-        let passes = [tips(0.0), tips(y)];
-        let envelope = |pass: &[Vector3], x: f64, y: f64| {
-            let over =
-                |tip: &Vector3| tip.z + cutter.height((tip.x - x).hypot(tip.y - y)).unwrap_or(f64::INFINITY);
-            pass.iter().map(over).fold(f64::INFINITY, f64::min)
-        };
-        let left = |share: f64| {
-            let y = y * share;
-            let cut = passes.iter().map(|pass| envelope(pass, 0.0, y)).fold(f64::INFINITY, f64::min);
-            (cut - z(0.0, y)) * normal(0.0, y).z
-        };
-        // Where both leave as much: one rises and the other falls.
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..40 {
-            let share = 0.5 * (low + high);
-            let [a, b] = [0, 1].map(|k| envelope(&passes[k], 0.0, y * share));
-            if a < b { low = share } else { high = share }
+    /// A surface `z = 0.35 x + 0.1 y + c x y`.
+    #[derive(Clone, Copy)]
+    struct Twisted(f64);
+
+    impl Twisted {
+        fn at(self, x: f64, y: f64) -> Vector3 {
+            Vector3::new(x, y, 0.35 * x + 0.1 * y + self.0 * x * y)
         }
-        left(0.5 * (low + high))
+
+        fn normal(self, x: f64, y: f64) -> Vector3 {
+            Vector3::new(-0.35 - self.0 * y, -0.1 - self.0 * x, 1.0).normalize()
+        }
+
+        /// The ridge over the normal at x = 0 between two passes whose contacts at x have a y each, by brute
+        /// force.
+        fn ridge(self, cutter: &Cutter, contacts: [&dyn Fn(f64) -> f64; 2]) -> f64 {
+            let tips = |y: &dyn Fn(f64) -> f64| {
+                let at = |k: i32| {
+                    let x = f64::from(k) * 2e-4;
+                    self.at(x, y(x)) + cutter.contact_to_tip(&self.normal(x, y(x)))
+                };
+                (-4000..=4000).map(at).collect::<Vec<_>>()
+            };
+            let passes = contacts.map(tips);
+            let envelope = |pass: &[Vector3], y: f64| {
+                let over =
+                    |tip: &Vector3| tip.z + cutter.height(tip.x.hypot(tip.y - y)).unwrap_or(f64::INFINITY);
+                pass.iter().map(over).fold(f64::INFINITY, f64::min)
+            };
+            // Where both leave as much: one rises and the other falls.
+            let [mut low, mut high] = contacts.map(|y| y(0.0));
+            for _ in 0..40 {
+                let middle = 0.5 * (low + high);
+                let [a, b] = [0, 1].map(|k| envelope(&passes[k], middle));
+                if a < b { low = middle } else { high = middle }
+            }
+            (envelope(&passes[0], low).min(envelope(&passes[1], low)) - self.at(0.0, low).z)
+                * self.normal(0.0, low).z
+        }
     }
 
     /// By the section across the feed alone, ridges of the ball are lower than asked, and those of the bull
@@ -280,9 +306,42 @@ mod tests {
             let [width, by_section] = [surface, plain].map(|s| strip_width_at(&cutter, &n, &b, &s, h).0);
             // Passes at constant y are so far apart across the feed.
             let apart = b.dot(&y_tangent);
-            let [real, off] = [width, by_section].map(|width| ridge_over_twist(&cutter, c, width / apart));
+            let [real, off] =
+                [width, by_section].map(|width| Twisted(c).ridge(&cutter, [&|_| 0.0, &|_| width / apart]));
             assert!((real / h - 1.0).abs() < 0.01 && (off / h - 1.0).abs() > 0.05, "{real} {off}");
         }
+    }
+
+    /// A ball whose centre runs in planes at constant y: by strips of contacts along the feed, ridges are
+    /// higher than asked.
+    #[test]
+    fn a_cutter_fed_straight_over_a_twist_takes_no_wider_strip() {
+        let (h, c, cutter) = (1e-3, 0.06, Cutter::ball(10.0).unwrap());
+        let surface = Twisted(c);
+        let n = surface.normal(0.0, 0.0);
+        let t = Vector3::new(1.0, 0.0, 0.35).normalize();
+        let b = n.cross(&t);
+        let curvature = |d: &Vector3| 2.0 * c * n.z * d.x * d.y;
+        let bends = FeedCurvature::of(&t, &b, curvature);
+        let centre = |x: f64, y: f64| y + cutter.axis_offset(&surface.normal(x, y)).y;
+        let contacts = |plane: f64| {
+            move |x: f64| {
+                let (mut low, mut high) = (-3.0, 3.0);
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    *(if centre(x, middle) < plane { &mut low } else { &mut high }) = middle;
+                }
+                low
+            }
+        };
+        let [real, off] = [strip_width_fed, strip_width_at].map(|strip| {
+            // On the surface of the centres, and from there to the plan.
+            let on_offset = strip(&cutter, &n, &b, &bends, h).0 * (1.0 - curvature(&b) * cutter.radius());
+            let apart = on_offset * (1.0 - n.y * n.y).sqrt();
+            let (first, second) = (contacts(centre(0.0, 0.0)), contacts(centre(0.0, 0.0) + apart));
+            surface.ridge(&cutter, [&first, &second])
+        });
+        assert!((real / h - 1.0).abs() < 0.01 && off / h - 1.0 > 0.05, "{real} {off}");
     }
 
     #[test]

@@ -91,8 +91,9 @@ fn classical_strategies_are_read_and_written_back() {
     let cases = [
         (
             "zigzag\"\nangle = \"best\"\none_way = true",
-            boxed(Zigzag { angle: ZigzagAngle::Best, one_way: true }),
+            boxed(Zigzag { angle: ZigzagAngle::Best, one_way: true, ..Zigzag::at(0.0) }),
         ),
+        ("zigzag\"\nstep = \"constant\"", boxed(Zigzag { steps: LevelSteps::Constant, ..Zigzag::at(0.0) })),
         ("iso-parametric\"\nstep = \"shortest\"", steps(Some(Along::U), LevelSteps::Shortest)),
         ("iso-parametric\"\nalong = \"best\"", steps(None, LevelSteps::Shortest)),
         ("iso-parametric\"\nalong = \"v\"\nstep = \"least\"", steps(Some(Along::V), LevelSteps::Least)),

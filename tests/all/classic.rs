@@ -1,9 +1,9 @@
 //! The classical strategies against closed forms, brute force, and the simulator.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use millstream::cutter::Cutter;
-use millstream::geometry::{AnalyticShape, Point3};
+use millstream::geometry::{AnalyticShape, Point3, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
@@ -38,7 +38,7 @@ fn wave() -> Part {
 }
 
 const OPEN: [(&str, &dyn Strategy); 5] = [
-    ("best zigzag", &Zigzag { angle: ZigzagAngle::Best, one_way: false }),
+    ("best zigzag", &Zigzag { angle: ZigzagAngle::Best, one_way: false, ..Zigzag::at(0.0) }),
     ("iso-parametric, better way", &IsoParametric { along: None, steps: LevelSteps::Shortest }),
     ("iso-parametric, least", &IsoParametric { along: Some(Along::V), steps: LevelSteps::Least }),
     ("iso-scallop", &IsoScallop { start: FrontStart::BestBorder }),
@@ -80,13 +80,15 @@ fn every_classical_strategy_holds_the_scallop_and_leaves_nothing_uncut() {
 fn the_best_zigzag_is_as_short_as_the_best_of_many_planned() {
     let shape = AnalyticShape::Cylinder { height: 0.0, radius: 12.0, azimuth: 0.6, concave: false };
     let part = formula(shape, [-6.0, 6.0], [-6.0, 6.0]);
-    let best = cutting_length(&planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: false }).path);
+    let best = cutting_length(
+        &planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: false, ..Zigzag::at(0.0) }).path,
+    );
     for k in 0..9 {
         let angle = PI * f64::from(k) / 9.0;
         let other = cutting_length(&planned(&part, &Zigzag::at(angle)).path);
         assert!(best <= 1.02 * other, "{best} against {other} at {angle}");
     }
-    let one_way = planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: true }).path;
+    let one_way = planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: true, ..Zigzag::at(0.0) }).path;
     assert!(off(cutting_length(&one_way), best) < 0.01);
 }
 
@@ -134,6 +136,95 @@ fn a_crease_does_not_narrow_all_passes_of_a_zigzag() {
         "{passes} for {}",
         across / strip
     );
+}
+
+/// Where the planes of zigzag passes stand across their direction.
+fn planes(path: &Toolpath, angle: f64) -> Vec<f64> {
+    let moves = path.segments().filter(|(.., m)| m.kind == MoveKind::Cut);
+    let across = |p: Point3| p.y * angle.cos() - p.x * angle.sin();
+    let mut all: Vec<f64> = moves.map(|(_, to, _)| across(to)).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+    all
+}
+
+/// Balls of 6 mm over a wave, from its height alone: how far apart planes may stand at a place, and where the
+/// one stands that touches it.
+fn allowed_over_wave([amplitude, kx, ky]: [f64; 3], [x, y]: [f64; 2], angle: f64, h: f64) -> [f64; 2] {
+    let (r, s) = (3.0, amplitude);
+    let ((sx, cx), (sy, cy)) = ((kx * x).sin_cos(), (ky * y).sin_cos());
+    let (zx, zy) = (s * kx * cx * cy, -s * ky * sx * sy);
+    let n = Vector3::new(-zx, -zy, 1.0).normalize();
+    let e = Vector3::new(-angle.sin(), angle.cos(), 0.0);
+    // The feed lies in the surface and in the plane.
+    let b = n.cross(&e.cross(&n).normalize());
+    let (zxx, zxy, zyy) = (-kx * kx * s * sx * cy, -s * kx * ky * cx * sy, -ky * ky * s * sx * cy);
+    let bend = (zxx * b.x * b.x + 2.0 * zxy * b.x * b.y + zyy * b.y * b.y) * n.z;
+    // On the surface of the centres, of curvature κ/(1 − κ r), ridges between balls stand as over a plane.
+    let lean = (1.0 - n.dot(&e).powi(2)).sqrt();
+    [e.dot(&Vector3::new(x, y, 0.0)) + r * n.dot(&e), (8.0 * h * r * (1.0 - bend * r)).sqrt() * lean]
+}
+
+/// Each gap between two planes is as wide as the tightest place in it allows, and no wider.
+#[test]
+fn gaps_of_a_zigzag_are_what_the_surface_between_allows() {
+    let (amplitude, lengths, size) = (1.0, [20.0, 25.0], 12.0);
+    let [kx, ky] = lengths.map(|length| TAU / length);
+    let (part, h) = (wave(), 0.010 - 0.26 * LIMITS.chord);
+    for angle in [0.0, 0.5, FRAC_PI_2] {
+        let planes = planes(&planned(&part, &Zigzag::at(angle)).path, angle);
+        let mut least = vec![f64::INFINITY; planes.len()];
+        const PLACES: usize = 600;
+        for k in 0..PLACES * PLACES {
+            let at = [k % PLACES, k / PLACES].map(|k| size * (k as f64 + 0.5) / PLACES as f64);
+            let [axis, allowed] = allowed_over_wave([amplitude, kx, ky], at, angle, h);
+            let gap = planes.partition_point(|plane| *plane < axis);
+            if let Some(least) = least.get_mut(gap) {
+                *least = least.min(allowed);
+            }
+        }
+        let gaps = planes.windows(2).zip(&least[1..]).map(|(w, least)| (w[1] - w[0]) / least);
+        let gaps: Vec<f64> = gaps.filter(|share| share.is_finite()).collect();
+        let widest = gaps.iter().copied().fold(0.0, f64::max);
+        let mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
+        assert!(widest < 1.005 && mean > 0.95, "{angle}: {widest} {mean} of {}", gaps.len());
+        let constant = Zigzag { steps: LevelSteps::Constant, ..Zigzag::at(angle) };
+        let constant = self::planes(&planned(&part, &constant).path, angle);
+        let steps: Vec<f64> = constant.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(steps.iter().all(|step| off(*step, steps[0]) < 1e-5), "{angle}: {steps:?}");
+        assert!(constant.len() > planes.len(), "{angle}: {} {}", constant.len(), planes.len());
+    }
+}
+
+/// A flat end fed along a cylinder leaves stairs: on a slope of λ it is h over the surface t from where its rim
+/// touches, λ t + t²/(2 R) = h. Over the crest it rests as long as it is wide. The rim leaves the part at its
+/// lowest lines, and nothing stays there.
+#[test]
+fn a_flat_end_along_a_cylinder_takes_narrow_steps_on_its_flanks_alone() {
+    let (radius, half, h) = (1000.0, 20.0, 0.010 - 0.26 * LIMITS.chord);
+    let cutter = Cutter::flat(20.0).unwrap();
+    let shape = AnalyticShape::Cylinder { height: 0.0, radius, azimuth: 0.0, concave: false };
+    let smooth = formula(shape, [0.0, 30.0], [-half, half]);
+    let at = |x: f64, k: u32| {
+        let y = half * (f64::from(k) / 40.0 - 1.0);
+        Point3::new(x, y, (radius * radius - y * y).sqrt() - radius)
+    };
+    let corners = (0..=80).flat_map(|k| [at(0.0, k), at(30.0, k)]).collect();
+    let strips =
+        (0..80).flat_map(|k| [[2 * k, 2 * k + 1, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 2]]).collect();
+    let facets = mesh(corners, strips);
+    let stair = |y: f64| ((y / radius).powi(2) + 2.0 * h / radius).sqrt() * radius - y;
+    let flank: f64 = (0..2000).map(|k| 0.01 / stair((f64::from(k) + 0.5) * 0.01)).sum();
+    let exact = 2.0 * flank + 20.0 / stair(0.0);
+    // Each step is that of its lower end.
+    for (part, most) in [(&smooth, 1.05 * exact + 2.0), (&facets, 1.1 * exact + 2.0)] {
+        let plan = plan(part, &cutter, &Zigzag::at(0.0), &settings(part, TARGET), &Silent).unwrap();
+        let count = planes(&plan.path, 0.0).len() as f64;
+        assert!(count >= exact && count <= most, "{count} for {exact}");
+        let m = cut_and_measure(part, &cutter, &plan.path, 0.1, &LIMITS);
+        assert_eq!(m.uncut.region_count, 0, "{:?}", m.uncut.regions);
+        assert!(m.excess.highest.max_mm < 0.0115, "{:?}", m.excess.highest);
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ pub mod halving;
 pub mod level_passes;
 pub mod obedience;
 pub mod on_triangles;
+pub mod planes;
 pub mod planned_field;
 pub mod spacing;
 pub mod spirals;

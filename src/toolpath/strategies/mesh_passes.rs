@@ -267,7 +267,8 @@ pub(crate) fn widest_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, 
     widest_strip_at(cutter, n, b, &bends_across(n, b, bend), h)
 }
 
-fn bends_across(n: &Vector3, b: &Vector3, bend: &Bend) -> FeedCurvature {
+/// How a surface bends at a place with the unit normal `n`, `b` across the feed.
+pub(crate) fn bends_across(n: &Vector3, b: &Vector3, bend: &Bend) -> FeedCurvature {
     FeedCurvature::of(&b.cross(n), b, |d| bend.along(d))
 }
 

@@ -103,7 +103,7 @@ fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
         let (angle, radius) = (a.angle + t * (b.angle - a.angle), a.radius + t * (b.radius - a.radius));
         middle + Vector2::new(angle.cos(), angle.sin()) * radius
     };
-    let (drop, border) = (DropCutter::watched(part, dropped, monitor)?, Border::of(part));
+    let (drop, border) = (&DropCutter::watched(part, dropped, monitor)?, &Border::of(part));
     let curves = PlanCurves { drop, border, cutter: dropped, overrun: widest, settings, monitor };
     monitor.start("planning spiral", 1);
     monitor::check(monitor)?;

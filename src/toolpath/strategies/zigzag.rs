@@ -1,9 +1,9 @@
 //! Zigzag: passes in parallel vertical planes, the cutter dropped on the part along each.
 //!
-//! One stepover serves the whole part, so it is that of the worst place. Passes a plan-view distance Δ apart
-//! lie `Δ/√(1 − (n·e)²)` apart on the surface of the cutter's centres, `e` the plan direction across the
-//! feed; that surface is the part's offset, where lengths across the feed are `1 − κ r` times those on the
-//! part.
+//! Two neighbouring passes are as far apart as the tightest place between them allows; with one step for all,
+//! as the tightest place of the part does. Passes a plan-view distance Δ apart lie `Δ/√(1 − (n·e)²)` apart on
+//! the surface of the cutter's centres, `e` the plan direction across the feed; that surface is the part's
+//! offset, where lengths across the feed are `1 − κ r` times those on the part.
 //!
 //! Of meshes with creases the facets tell the stepover: a smooth surface over a crease bends as no face of
 //! the part does. What is left at creases is measured, and corrected there.
@@ -11,10 +11,11 @@
 use std::fmt::{self, Write as _};
 
 use crate::levels::level_passes::along_levels_placed;
+use crate::levels::planes::AllowedGaps;
 use crate::levels::spacing::LevelSteps;
-use crate::strategies::mesh_passes::width_at;
+use crate::strategies::mesh_passes::bends_across;
 use crate::surface::border::Border;
-use crate::surface::chart::{Chart, ChartPoint};
+use crate::surface::chart::{Chart, ChartPoint, dropped_offset};
 use crate::surface::mesh_surface::{ConnectedPiece, reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
 use crate::vocabulary::{Definition, Faces, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
@@ -22,16 +23,17 @@ use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::ScalarField;
 use field::mesh::Bend;
-use geometry::{Vector2, Vector3};
-use keys::{SceneError, toml_number};
+use geometry::{Point3, Vector2, Vector3};
+use keys::{SceneError, toml_number, word_of};
+use scallop::strip_width_fed;
 use work::monitor;
 
 /// The stepover is never planned below this share of that on a horizontal plane: a steep wall
-/// would otherwise ask for endless passes over the whole part. What is left there is measured.
+/// would otherwise ask for endless passes. What is left there is measured.
 const LEAST_OVER_PLANE: f64 = 0.1;
 
-/// Places a side of each chart at which the stepover is computed.
-const STEPOVER_SAMPLES: usize = 160;
+/// Cells a side of each chart at whose corners the stepover is computed.
+const NET_CELLS: usize = 160;
 
 /// Angles over half a turn whose length is predicted. Between two of them a length changes by a few per cent
 /// at most.
@@ -50,7 +52,14 @@ pub struct Zigzag {
     pub angle: ZigzagAngle,
     /// Cut in one direction only.
     pub one_way: bool,
+    /// How planes step: all alike, or each by what lies between it and the one before. Under a cutter that
+    /// leans over patches, as levels do.
+    pub steps: LevelSteps,
 }
+
+/// Words for `step`.
+const STEPS: [(&str, LevelSteps); 2] =
+    [("adaptive", LevelSteps::Shortest), ("constant", LevelSteps::Constant)];
 
 /// In which direction zigzag passes run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +74,7 @@ pub enum ZigzagAngle {
 impl Zigzag {
     /// Passes `angle` from the x axis (rad), fed both ways.
     pub const fn at(angle: f64) -> Self {
-        Self { angle: ZigzagAngle::Given(angle), one_way: false }
+        Self { angle: ZigzagAngle::Given(angle), one_way: false, steps: LevelSteps::Shortest }
     }
 }
 
@@ -74,19 +83,20 @@ pub(crate) static DEFINITION: Definition = Definition {
     word: "zigzag",
     help: "parallel vertical planes at an angle, or at the angle with the shortest path",
     part: PartKind::Surface,
-    keys: &["angle", "one_way"],
+    keys: &["angle", "one_way", "step"],
     read,
 };
 
 fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     let one_way = from.section.flag("one_way")?.unwrap_or(false);
+    let steps = from.section.choice("step", &STEPS)?;
     if from.section.is_text("angle") {
         from.section.word("angle", &["best"])?;
-        return Ok(Box::new(Zigzag { angle: ZigzagAngle::Best, one_way }));
+        return Ok(Box::new(Zigzag { angle: ZigzagAngle::Best, one_way, steps }));
     }
     let angle = from.section.number("angle", -360.0..=360.0, " degrees")?;
     let angle = ZigzagAngle::Given(angle.map_or(0.0, |v| v.value.to_radians()));
-    Ok(Box::new(Zigzag { angle, one_way }))
+    Ok(Box::new(Zigzag { angle, one_way, steps }))
 }
 
 impl Strategy for Zigzag {
@@ -101,15 +111,16 @@ impl Strategy for Zigzag {
             }
             ZigzagAngle::Best => writeln!(out, "angle = \"best\"  # searched")?,
         }
-        writeln!(out, "one_way = {}", self.one_way)
+        writeln!(out, "one_way = {}", self.one_way)?;
+        writeln!(out, "step = \"{}\"", word_of(&STEPS, &self.steps))
     }
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         match self.angle {
             // Patches under a tilted cutter: it follows the levels of a coordinate, and is not dropped.
-            ZigzagAngle::Given(angle) if task.follows_contacts() => on_levels(task, angle),
-            ZigzagAngle::Given(angle) => passes(task, angle),
-            ZigzagAngle::Best => best(task),
+            ZigzagAngle::Given(angle) if task.follows_contacts() => on_levels(task, angle, self.steps),
+            ZigzagAngle::Given(angle) => passes(task, angle, self.steps),
+            ZigzagAngle::Best => best(task, self.steps),
         }
     }
 
@@ -119,96 +130,110 @@ impl Strategy for Zigzag {
 }
 
 /// Plans passes in the direction `angle` (rad from x).
-fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>, angle: f64, steps: LevelSteps) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
     let mut notes = Vec::new();
     let dropped = task.dropped();
-    let stepover = match settings.step {
-        Step::Stepover(s) => s,
-        Step::Scallop(h) => {
-            let ground = Ground::of(task, || places(&charts, &settings.faces), h);
-            safe_stepover(&ground, [cutter, dropped], angle, h, &mut notes)
-        }
-    };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, settings.chord_tolerance, e);
     let (from_to, sides) = (extent(&along), extent(&across));
-    let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
-    // A stepover that the user asked for is kept exactly, and the passes stand in the middle.
-    let pitch = match settings.step {
-        Step::Stepover(s) => s,
-        Step::Scallop(_) => (sides[1] - sides[0]) / count as f64,
+    let planes = match settings.step {
+        Step::Stepover(stepover) => in_the_middle(sides, stepover),
+        Step::Scallop(h) => {
+            let allowed = Ground::of(task, &charts).allowed(task, angle, h, sides);
+            notes.extend(steepest_note(allowed.least(), cutter, h));
+            placed(allowed, cutter, h, steps)
+        }
     };
-    let middle = 0.5 * (sides[0] + sides[1]);
     let (drop, border) = (DropCutter::watched(part, dropped, monitor)?, Border::of(part));
-    let curves = PlanCurves { drop, border, cutter: dropped, overrun: pitch, settings, monitor };
-    monitor.start("planning zigzag", count as u64);
-    let lines = work::parallel::try_map(count, |k| {
+    monitor.start("planning zigzag", planes.len() as u64);
+    let lines = work::parallel::try_map(planes.len(), |k| {
         monitor::check(monitor)?;
-        let offset = middle + (k as f64 - 0.5 * (count as f64 - 1.0)) * pitch;
-        let line = |s: f64| along * s + across * offset;
-        let pieces = curves.pieces(&line, [from_to[0] - pitch, from_to[1] + pitch])?;
+        let overrun = match settings.step {
+            Step::Stepover(stepover) => stepover,
+            Step::Scallop(_) => gaps_beside(&planes, k, sides).into_iter().fold(0.0, f64::max),
+        };
+        let curves = PlanCurves { drop: &drop, border: &border, cutter: dropped, overrun, settings, monitor };
+        let line = |s: f64| along * s + across * planes[k];
+        let pieces = curves.pieces(&line, [from_to[0] - overrun, from_to[1] + overrun])?;
         monitor.advance(1);
         Ok::<_, PlanError>(pieces)
     })?;
     Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
 }
 
-/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on
-/// each patch.
-fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+/// Planes a stepover apart that the user asked for: it is kept exactly, and they stand in the middle.
+fn in_the_middle([low, high]: [f64; 2], stepover: f64) -> Vec<f64> {
+    let count = ((high - low) / stepover - 1e-9).ceil().max(1.0);
+    let middle = 0.5 * (low + high);
+    (0..count as usize).map(|k| middle + (k as f64 - 0.5 * (count - 1.0)) * stepover).collect()
+}
+
+/// The planes of passes, by what lies between them, or all as far apart as the tightest place allows.
+fn placed(allowed: AllowedGaps, cutter: &Cutter, h: f64, steps: LevelSteps) -> Vec<f64> {
+    let allowed = allowed.filled(least_over_plane(cutter, h));
+    if steps == LevelSteps::Constant { allowed.even().planes() } else { allowed.planes() }
+}
+
+/// How far the planes on both sides of one of them stand from it; beside the first and the last, twice as far
+/// as the end of the range.
+fn gaps_beside(planes: &[f64], k: usize, [low, high]: [f64; 2]) -> [f64; 2] {
+    let at = planes[k];
+    let before = if k == 0 { 2.0 * (at - low) } else { at - planes[k - 1] };
+    [before, planes.get(k + 1).map_or(2.0 * (high - at), |next| next - at)]
+}
+
+/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes.
+fn on_levels(task: &Task<'_>, angle: f64, steps: LevelSteps) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let across = Vector2::new(-angle.sin(), angle.cos());
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter, settings.guide())? {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
-        all.append(along_levels_placed(task, &chart, &field, LevelSteps::Constant)?);
+        all.append(along_levels_placed(task, &chart, &field, steps)?);
     }
     Ok(all)
 }
 
 /// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the
-/// predicted length (surface along the feed over the stepover), and the best are planned.
-fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
+/// predicted length (surface along the feed over the distance of planes), and the best are planned.
+fn best(task: &Task<'_>, steps: LevelSteps) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
-    let places = places(&charts, &settings.faces);
+    let nets: Vec<Net<'_>> = charts.iter().map(|chart| Net::of(chart, &settings.faces)).collect();
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();
-    let ground = match settings.step {
-        Step::Stepover(_) => Ground::Facets { all: Vec::new(), factor: 1.0 },
-        Step::Scallop(h) => Ground::of(task, || places.clone(), h),
+    let (given, ground) = match settings.step {
+        Step::Stepover(s) => (s, None),
+        Step::Scallop(h) => (0.0, Some((Ground::of(task, &charts), h))),
     };
     let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
-        let stepover = match settings.step {
-            Step::Stepover(s) => s,
-            Step::Scallop(h) => {
-                let least = ground.least_stepover([cutter, dropped], angle(k), h);
-                if least.is_finite() {
-                    least.max(least_over_plane(cutter, h))
-                } else {
-                    least_over_plane(cutter, h)
-                }
-            }
-        };
-        let covered = places.iter().filter_map(|(p, area)| {
+        let e = Vector2::new(-angle(k).sin(), angle(k).cos());
+        let across = |p: &ChartPoint| axis_over(task, &p.jet.p, &p.normal).dot(&e);
+        let places = || nets.iter().flat_map(Net::places);
+        let sides = places().map(|(p, _)| across(p)).fold([f64::INFINITY, f64::NEG_INFINITY], widened);
+        let planes = ground
+            .as_ref()
+            .map(|(ground, h)| placed(ground.allowed(task, angle(k), *h, sides), cutter, *h, steps));
+        let stepover =
+            |p: &ChartPoint| planes.as_ref().map_or(given, |planes| gap_over(planes, across(p), sides));
+        let covered = places().filter_map(|(p, area)| {
             // The way of the corner's centre over one place: its length along the feed, and its width in the
             // plan view.
             let t = p.tangent_at(angle(k))?;
-            let e = Vector2::new(-angle(k).sin(), angle(k).cos());
             let b = p.normal.cross(&t);
             let (along, across) = (p.offset_ratio(dropped, &t), p.offset_ratio(dropped, &b));
-            Some(area * along * across * b.xy().dot(&e).abs())
+            Some(area * along * across * b.xy().dot(&e).abs() / stepover(p))
         });
-        (covered.sum::<f64>() / stepover, k)
+        (covered.sum::<f64>(), k)
     });
     predicted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut planned = Vec::new();
     for &(_, k) in &predicted[..PLANNED] {
         monitor::check(monitor)?;
-        planned.push((passes(task, angle(k))?, k));
+        planned.push((passes(task, angle(k), steps)?, k));
     }
     let lengths: Vec<f64> = planned.iter().map(|(passes, _)| passes.length()).collect();
     let shortest = (0..lengths.len()).min_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);
@@ -223,19 +248,64 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     Ok(best)
 }
 
-/// Points of all charts on such faces, and the area that each stands for, mm².
-fn places<'a>(charts: &[Chart<'a>], faces: &Faces) -> Vec<(ChartPoint<'a>, f64)> {
-    let of = |chart: &Chart<'a>| {
-        let [[u0, u1], [v0, v1]] = chart.domain;
-        let cell = (u1 - u0) * (v1 - v0) / (STEPOVER_SAMPLES * STEPOVER_SAMPLES) as f64;
-        let point = |[u, v]: [f64; 2]| {
-            let p = chart.at(u, v).filter(|p| faces.hold(&p.normal))?;
+/// Where the axis of what is dropped stands, in the plan view, that touches a place of a surface with the unit
+/// normal `n`.
+fn axis_over(task: &Task<'_>, at: &Point3, n: &Vector3) -> Vector2 {
+    at.coords.xy() + dropped_offset(n, task.dropped(), task.settings.chord_tolerance)
+}
+
+/// The distance of the planes on both sides of a coordinate.
+fn gap_over(planes: &[f64], at: f64, sides: [f64; 2]) -> f64 {
+    match planes.partition_point(|plane| *plane < at) {
+        0 => gaps_beside(planes, 0, sides)[0],
+        k => gaps_beside(planes, k - 1, sides)[1],
+    }
+}
+
+/// A range with one more value.
+fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
+    [low.min(value), high.max(value)]
+}
+
+/// A chart's points on faces that are asked for, at the nodes of a grid over all of it.
+struct Net<'a> {
+    nodes: Vec<Option<(ChartPoint<'a>, f64)>>,
+}
+
+impl<'a> Net<'a> {
+    /// Each with the area that it stands for, mm².
+    fn of(chart: &Chart<'a>, faces: &Faces) -> Self {
+        let ([[u0, u1], [v0, v1]], n) = (chart.domain, NET_CELLS);
+        let at = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / n as f64;
+        let share = |k: usize| if k == 0 || k == n { 0.5 } else { 1.0 };
+        let node = |k: usize| {
+            let (i, j) = (k % (n + 1), k / (n + 1));
+            let p = chart.at(at(u0, u1, i), at(v0, v1, j)).filter(|p| faces.hold(&p.normal))?;
             let (e, f, g) = p.jet.first_form();
-            Some((p, cell * (e * g - f * f).max(0.0).sqrt()))
+            let cell = (u1 - u0) * (v1 - v0) / (n * n) as f64;
+            Some((p, share(i) * share(j) * cell * (e * g - f * f).max(0.0).sqrt()))
         };
-        chart.grid(STEPOVER_SAMPLES).filter_map(point).collect::<Vec<_>>()
-    };
-    charts.iter().flat_map(of).collect()
+        Self { nodes: (0..(n + 1) * (n + 1)).map(node).collect() }
+    }
+
+    fn places(&self) -> impl Iterator<Item = &(ChartPoint<'a>, f64)> {
+        self.nodes.iter().flatten()
+    }
+
+    /// Limits what lies between the corners of each cell by the tightest of them: where the plane of a corner
+    /// stands, and how far from it the next one may.
+    fn limit(&self, allowed: &mut AllowedGaps, of_place: impl Fn(&ChartPoint<'a>) -> Option<(f64, f64)>) {
+        let side = NET_CELLS + 1;
+        let found: Vec<Option<(f64, f64)>> =
+            self.nodes.iter().map(|node| of_place(&node.as_ref()?.0)).collect();
+        for k in (0..side * (side - 1)).filter(|k| k % side + 1 < side) {
+            let corners = || [k, k + 1, k + side, k + side + 1].into_iter().filter_map(|k| found[k]);
+            if corners().next().is_some() {
+                let range = corners().map(|(at, _)| at).fold([f64::INFINITY, f64::NEG_INFINITY], widened);
+                allowed.limit(range, corners().map(|(_, gap)| gap).fold(f64::INFINITY, f64::min));
+            }
+        }
+    }
 }
 
 /// The least stepover ever planned, mm.
@@ -253,7 +323,7 @@ pub(crate) fn stepover_at(
     h: f64,
 ) -> Option<f64> {
     let t = p.tangent_at(angle)?;
-    let strip = p.strip_width(cutter, &t, Step::Scallop(h));
+    let strip = p.strip_width_fed(cutter, &t, h);
     in_plan(strip, p.curvature_along(&p.normal.cross(&t)), &p.normal, dropped, angle)
 }
 
@@ -278,64 +348,83 @@ fn in_plan(
 /// Where the stepover is computed.
 enum Ground<'a> {
     /// Places of charts.
-    Charts(Vec<(ChartPoint<'a>, f64)>),
-    /// Facets by their normals, and how the surface bends there. Widths are corrected by the least factor
-    /// anywhere: one stepover serves all.
-    Facets { all: Vec<(Vector3, Bend)>, factor: f64 },
+    Charts(Vec<Net<'a>>),
+    /// Facets of a mesh.
+    Facets(Vec<Facet>),
+}
+
+/// A facet of a mesh with creases.
+struct Facet {
+    corners: [Point3; 3],
+    /// Normals at the corners, of its own side of any crease.
+    normals: [Vector3; 3],
+    normal: Vector3,
+    bend: Bend,
+    /// What was measured of widths there.
+    factor: f64,
 }
 
 impl<'a> Ground<'a> {
     /// The facets of a mesh with creases; the places of charts otherwise.
-    fn of(task: &Task<'_>, places: impl FnOnce() -> Vec<(ChartPoint<'a>, f64)>, h: f64) -> Self {
-        let Task { part, cutter, .. } = *task;
+    fn of(task: &Task<'_>, charts: &[Chart<'a>]) -> Self {
+        let Task { part, cutter, ref settings, .. } = *task;
         let has_creases = part.patches().is_empty() && wants_mesh(part, cutter);
-        let flat = (8.0 * h * cutter.radius()).sqrt();
         // What is no surface still has heights for charts.
-        let Some(reached) = has_creases.then(|| reachable(part, cutter, flat).ok()).flatten() else {
-            return Self::Charts(places());
+        let Some(reached) = has_creases.then(|| reachable(part, cutter, 0.0).ok()).flatten() else {
+            return Self::Charts(charts.iter().map(|chart| Net::of(chart, &settings.faces)).collect());
         };
-        let facets = |piece: &ConnectedPiece| -> Vec<(Vector3, Bend)> {
-            let all = (0..piece.mesh.triangles().len()).filter_map(|t| piece.facet(t));
-            all.filter(|(normal, _)| normal.z > 0.0 && task.settings.faces.hold(normal)).collect()
+        let correction = settings.guide().correction;
+        let facet = |piece: &ConnectedPiece, t: usize| {
+            let (normal, bend) = piece.facet(t)?;
+            let corners = piece.mesh.triangles()[t].map(|v| piece.mesh.points()[v as usize]);
+            let factors = corners.iter().filter_map(|corner| Some(correction?.at(corner)));
+            let factor = factors.reduce(f64::min).unwrap_or(1.0);
+            Some(Facet { corners, normals: piece.corner_normals[t], normal, bend, factor })
         };
-        let factor = task.settings.guide().correction.map_or(1.0, |correction| correction.range()[0]);
-        Self::Facets { all: reached.pieces.iter().flat_map(facets).collect(), factor }
+        let facets = reached
+            .pieces
+            .iter()
+            .flat_map(|piece| (0..piece.mesh.triangles().len()).filter_map(move |t| facet(piece, t)));
+        let asked = |facet: &Facet| facet.normal.z > 0.0 && settings.faces.hold(&facet.normal);
+        Self::Facets(facets.filter(asked).collect())
     }
 
-    fn least_stepover(&self, cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
-        let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
+    /// How far apart planes may stand within a range across the direction `angle`.
+    fn allowed(&self, task: &Task<'_>, angle: f64, h: f64, sides: [f64; 2]) -> AllowedGaps {
+        let cutters = [task.cutter, task.dropped()];
+        let mut allowed = AllowedGaps::over(sides);
+        let e = Vector2::new(-angle.sin(), angle.cos());
+        let axis = |at: &Point3, n: &Vector3| axis_over(task, at, n).dot(&e);
         match self {
-            Self::Charts(places) => {
-                least(&mut places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)))
-            }
-            Self::Facets { all, factor } => least(&mut all.iter().filter_map(|(normal, bend)| {
+            Self::Charts(nets) => nets.iter().for_each(|net| {
+                net.limit(&mut allowed, |p| {
+                    Some((axis(&p.jet.p, &p.normal), stepover_at(p, cutters, angle, h)?))
+                });
+            }),
+            Self::Facets(facets) => facets.iter().for_each(|facet| {
+                let Facet { corners, normals, normal, bend, factor } = facet;
                 let flat = Vector3::new(angle.cos(), angle.sin(), 0.0);
                 let t = (flat - Vector3::z() * (normal.dot(&flat) / normal.z)).normalize();
                 let b = normal.cross(&t);
-                let (width, too_concave) = width_at(cutters[0], normal, &b, bend, Step::Scallop(h));
-                in_plan((factor * width, too_concave), bend.along(&b), normal, cutters[1], angle)
-            })),
+                let bends = bends_across(normal, &b, bend);
+                let (width, too_concave) = strip_width_fed(cutters[0], normal, &b, &bends, h);
+                let strip = (factor * width, too_concave);
+                let ends = [0, 1, 2].map(|k| axis(&corners[k], &normals[k]));
+                if let Some(gap) = in_plan(strip, bend.along(&b), normal, cutters[1], angle) {
+                    allowed.limit(ends.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], widened), gap);
+                }
+            }),
         }
+        allowed
     }
 }
 
-/// The greatest stepover that keeps the scallop everywhere.
-fn safe_stepover(
-    ground: &Ground<'_>,
-    cutters: [&Cutter; 2],
-    angle: f64,
-    h: f64,
-    notes: &mut Vec<String>,
-) -> f64 {
-    let least = ground.least_stepover(cutters, angle, h);
-    let floor = least_over_plane(cutters[0], h);
-    if least.is_finite() && least >= floor {
-        return least;
-    }
-    notes.push(format!(
+/// What is told where the steepest places ask for closer passes than are ever planned.
+fn steepest_note(least: f64, cutter: &Cutter, h: f64) -> Option<String> {
+    let floor = least_over_plane(cutter, h);
+    (!least.is_finite() || least < floor).then(|| format!(
         "the steepest places would need a stepover of {:.4} mm; {floor:.4} mm is used, and scallops there may exceed the \
          target (another angle or a streamline path helps, or `slope` with another toolpath for what is steeper)",
         if least.is_finite() { least } else { 0.0 },
-    ));
-    floor
+    ))
 }

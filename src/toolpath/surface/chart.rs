@@ -15,7 +15,7 @@ use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use motion::{CcPoint, in_tool_frame};
 use part::Part;
-use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at, widest_strip_at};
+use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at, strip_width_fed, widest_strip_at};
 
 /// Control points of a height surface lie so many facets apart, and no less and no more than these shares of
 /// the cutter's radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so
@@ -206,6 +206,14 @@ impl ChartPoint<'_> {
                 (self.guide.corrected(width, &self.jet.p, step), limited)
             }
         }
+    }
+
+    /// [`ChartPoint::strip_width`] of a cutter that is fed straight along `t`, below the scallop height `h`,
+    /// mm: in a plane, wherever that takes its contact.
+    pub fn strip_width_fed(&self, cutter: &Cutter, t: &Vector3, h: f64) -> (f64, bool) {
+        let [n, b] = self.across_in_tool_frame(cutter, t);
+        let (width, limited) = strip_width_fed(cutter, &n, &b, &self.bends(t), h);
+        (self.guide.corrected(width, &self.jet.p, Step::Scallop(h)), limited)
     }
 
     /// Wider than any path's strip along the unit feed tangent `t` below the scallop height `h`, mm, as
@@ -423,7 +431,7 @@ impl<'a> Chart<'a> {
             for t in 0..mesh.triangles().len() {
                 let normal = mesh.normal(t);
                 if normal.z > 0.0 {
-                    let offset = cutter.axis_offset(&normal);
+                    let offset = dropped_offset(&normal, cutter, chord);
                     mesh.corners(t).iter().for_each(|corner| include(corner.coords.xy() + offset));
                 }
             }
@@ -431,7 +439,7 @@ impl<'a> Chart<'a> {
         }
         for k in 0..(N + 1) * (N + 1) {
             if let Some(p) = self.at(at(u0, u1, k % (N + 1)), at(v0, v1, k / (N + 1))) {
-                include(self.axis_over(&p, cutter, chord));
+                include(p.jet.p.coords.xy() + dropped_offset(&p.normal, cutter, chord));
             }
         }
         extent
@@ -453,6 +461,13 @@ pub fn axis_offset_over(
     let turns = |bend: f64| flat * if bend > 0.0 { bend / MOST_BEHIND } else { -bend / MOST_AHEAD };
     let level = bends.map(turns).into_iter().fold(0.5 * chord / flat, f64::max);
     cutter.axis_offset_from(n, level)
+}
+
+/// From a contact to the axis of a cutter that is dropped on a surface, in the plan view. Its flat reaches as
+/// far as it does on a slope, but where that changes heights by less than half of `chord` mm.
+pub fn dropped_offset(n: &Vector3, cutter: &Cutter, chord: f64) -> Vector2 {
+    let flat = cutter.flat_radius();
+    if flat > 0.0 { cutter.axis_offset_from(n, 0.5 * chord / flat) } else { cutter.axis_offset(n) }
 }
 
 /// Least-squares bicubic height surface over the plan view of a mesh part.

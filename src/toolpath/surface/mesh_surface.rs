@@ -127,7 +127,7 @@ pub(crate) fn wants_mesh(part: &Part, cutter: &Cutter) -> bool {
 }
 
 /// Everything of a part that passes along the surface can reach; `interval` (mm) is their distance on
-/// level ground.
+/// level ground, or 0 where sharp edges are not to bring them nearer.
 ///
 /// # Errors
 /// When the part's triangles do not make a surface, or nothing of it faces up.
@@ -224,7 +224,7 @@ fn sharpen(
             open.push((Reverse(0u64), v, v));
         }
     }
-    if open.is_empty() {
+    if open.is_empty() || interval <= 0.0 {
         return;
     }
     let mut next: Vec<Vec<u32>> = vec![Vec::new(); normals.len()];

@@ -45,8 +45,8 @@ enum Footing {
 
 /// Turns curves of the plan view into passes.
 pub(crate) struct PlanCurves<'a> {
-    pub drop: DropCutter<'a>,
-    pub border: Border<'a>,
+    pub drop: &'a DropCutter<'a>,
+    pub border: &'a Border<'a>,
     pub cutter: &'a Cutter,
     /// How far a pass may roll on over the border, mm.
     pub overrun: f64,
@@ -263,8 +263,8 @@ mod tests {
             probe: None,
         };
         let curves = PlanCurves {
-            drop: DropCutter::new(&part, &cutter),
-            border: Border::of(&part),
+            drop: &DropCutter::new(&part, &cutter),
+            border: &Border::of(&part),
             cutter: &cutter,
             overrun: 2.0 * radius,
             settings: &settings,
