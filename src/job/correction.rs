@@ -433,9 +433,9 @@ impl Session {
     }
 
     /// Whether moves of a toolpath can go deeper beside places that stand a little too high. Those of a tool
-    /// that leans cannot.
+    /// that leans cannot, and where a toolpath is for some places others may have left what stands.
     fn may_lower(&self, request: &ToolpathRequest) -> bool {
-        request.correct && request.axis.is_none() && self.pocket.is_none()
+        request.correct && request.axis.is_none() && self.pocket.is_none() && !request.is_for_places()
     }
 
     /// Whether a toolpath is planned as if chords raised nothing. The gouge tolerance has to leave moves the

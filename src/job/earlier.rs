@@ -8,14 +8,15 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use cutter::{Cutter, Holder};
-use geometry::Point2;
+use geometry::{Point2, Point3};
 use metrology::View;
-use motion::{Cutters, PathsInTurn, Toolpath};
+use motion::{Cutters, PathsInTurn, ROUNDING, Toolpath};
 use scene::Scene;
 use sim::ZMap;
 use toolpath::Rest;
 
 use super::Outcome;
+use super::judge::highest_reached;
 use super::tool::ToolMoves;
 
 /// A toolpath that cut before another one.
@@ -39,9 +40,15 @@ impl EarlierPath {
         let Outcome { result, path, cutters, holders, measurement, view, .. } = outcome;
         let left = match view {
             View::Heights(ZMap { grid, .. }) => {
-                let above = |deviation: &f32| f64::from(*deviation) > scene.tolerance.scallop;
+                let limit = scene.tolerance.scallop;
+                let above = |deviation: &f32| f64::from(*deviation) > limit;
                 let stands = measurement.deviation_map.iter().map(above).collect();
-                Rest::new(grid.origin, grid.cell, [grid.nx, grid.ny], stands)
+                let rest = Rest::new(grid.origin, grid.cell, [grid.nx, grid.ny], stands);
+                // Between the centres of cells, and along borders.
+                let highest = highest_reached(measurement);
+                let highest = highest.at_mm.map(|at| (Point3::from(at), highest.at_most()));
+                let places = measurement.above.iter().map(|place| (place.at, place.height)).chain(highest);
+                rest.and(places.filter(|(_, height)| *height > limit - 2.0 * ROUNDING).map(|(at, _)| at.xy()))
             }
             // No toolpath goes on behind these.
             View::Normals(_) => Rest::new(Point2::origin(), 1.0, [0; 2], Vec::new()),

@@ -453,7 +453,8 @@ mod tests {
         let session = Session::new(Scene::parse("shell.toml", text).unwrap()).unwrap();
         let gouge = session.scene.tolerance.gouge;
         let deepest = |part: &Part| {
-            let needed = Tool::of(&session.scene.tooling).keep_clear(&session.scene, part, &[]).checks[0].needed;
+            let needed =
+                Tool::of(&session.scene.tooling).keep_clear(&session.scene, part, &[]).checks[0].needed;
             part.mesh_deviation() - needed
         };
         let near = session.closer_part(&Silent).unwrap().unwrap();

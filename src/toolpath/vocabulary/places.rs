@@ -33,6 +33,17 @@ impl Rest {
         Self { origin, cell, count, stands }
     }
 
+    /// With the cells of further places.
+    #[must_use]
+    pub fn and(mut self, places: impl Iterator<Item = Point2>) -> Self {
+        for place in places {
+            if let Some(k) = self.cell_of(&place) {
+                self.stands[k] = true;
+            }
+        }
+        self
+    }
+
     /// Whether anything is left at all.
     pub fn is_empty(&self) -> bool {
         !self.stands.contains(&true)
@@ -40,9 +51,14 @@ impl Rest {
 
     /// Whether too much stands in the cell of a place.
     pub fn stands(&self, p: &Point2) -> bool {
+        self.cell_of(p).is_some_and(|k| self.stands[k])
+    }
+
+    fn cell_of(&self, p: &Point2) -> Option<usize> {
         let [i, j] = [0, 1].map(|axis| ((p[axis] - self.origin[axis]) / self.cell).round());
         let [nx, ny] = self.count;
-        i >= 0.0 && j >= 0.0 && i < nx as f64 && j < ny as f64 && self.stands[j as usize * nx + i as usize]
+        let is_on = i >= 0.0 && j >= 0.0 && i < nx as f64 && j < ny as f64;
+        is_on.then(|| j as usize * nx + i as usize)
     }
 
     /// With the squares of `reach`, mm, around each place.
@@ -95,6 +111,8 @@ mod tests {
             }
         }
         assert!(!grown.stands(&Point2::new(9.0, 20.0)) && !grown.stands(&Point2::new(14.4, 20.0)));
+        let more = rest.clone().and([Point2::new(10.0, 20.0), Point2::new(0.0, 0.0)].into_iter());
+        assert!(more.stands(&Point2::new(10.2, 20.2)) && !rest.stands(&Point2::new(10.2, 20.2)));
         assert!(!rest.is_empty() && Rest::new(Point2::origin(), 1.0, [1, 1], vec![false]).is_empty());
     }
 }
