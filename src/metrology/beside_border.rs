@@ -3,13 +3,12 @@
 //!
 //! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it,
 //! it goes on down the wall: what lies beyond belongs to no part. Where the side of a cutter reaches over a
-//! border by less than most of the gouge tolerance, what is left is as near, and the cut counts no deeper
-//! than that.
+//! border by less than the gouge tolerance, what is left is as near, and the cut counts no deeper than that.
 //!
 //! Enters: the part, a place of it, and the cut along its normal there. Leaves: how deep that counts, and at
 //! most around the place.
 
-use super::border_cuts::{BorderPiece, INSIDE_SHARE, least_way, pieces};
+use super::border_cuts::{BorderPiece, pieces};
 use super::closer::Value;
 use super::cut_surface::Deviation;
 use super::figures::NUMERICAL_FLOOR;
@@ -77,9 +76,9 @@ impl Inspection<'_> {
         if depth <= NUMERICAL_FLOOR {
             return None;
         }
-        let far = INSIDE_SHARE * self.limits.gouge;
+        let far = self.limits.gouge;
         let pieces = borders.near(p, &(p - normal * depth), far);
-        let left = pieces.iter().filter_map(|piece| self.near_left(piece, p, cut.by, aside));
+        let left = pieces.iter().filter_map(|piece| self.near_value(piece, p, cut.by, aside));
         let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();
         let moves: Vec<u32> = further.iter().copied().chain((cut.by != NOT_CUT).then_some(cut.by)).collect();
         let wall = self
@@ -99,11 +98,11 @@ impl Inspection<'_> {
 
     /// How far what a move leaves is from a place beside a piece, where that is near, and at most as far as
     /// `aside` mm around.
-    fn near_left(&self, piece: &BorderPiece, p: &Point3, by: u32, aside: f64) -> Option<Value> {
+    fn near_value(&self, piece: &BorderPiece, p: &Point3, by: u32, aside: f64) -> Option<Value> {
         if by == NOT_CUT {
             return None;
         }
-        let far = INSIDE_SHARE * self.limits.gouge;
+        let far = self.limits.gouge;
         let [a, b] = piece.ends.map(|end| end.xy());
         let share = share_on(&p.xy(), &a, &b);
         let (foot, _) = piece.design(self.part, share);
@@ -112,23 +111,13 @@ impl Inspection<'_> {
         if inside > far || (way - piece.inward * inside).norm() > NUMERICAL_FLOOR + piece.bend {
             return None;
         }
-        let is_left = |share: f64, far: f64| {
-            let place = piece.design(self.part, share).0 + piece.inward_by(share, far);
-            Some(place.z <= self.surface.envelope.height(by, place.x, place.y)?)
-        };
-        let here = match is_left(share, far) {
-            Some(false) => return None,
-            Some(true) => {
-                let left = |far: f64| is_left(share, far) == Some(true);
-                (foot + piece.inward_by(share, least_way(far, left)) - p).norm()
-            }
-            // As little as the border itself counts where a move does not pass beside it, as beside a
-            // vertical flank.
-            None => 0.0,
-        };
-        let along = aside / (b - a).norm();
-        let around = [share - along, share + along].map(|share| share.clamp(0.0, 1.0));
-        let holds = inside + aside <= far && around.iter().all(|share| is_left(*share, far) != Some(false));
+        let within = |share: f64, far: f64| piece.design(self.part, share).0 + piece.inward_by(share, far);
+        let here = self.near_left(piece, by, share, p)?;
+        // Before an end, where another border may begin, what counts as near is one place.
+        let (along, end) = (aside / (b - a).norm(), piece.end(far));
+        let [from, to] = [share - along, share + along].map(|share| share.clamp(end, 1.0 - end));
+        let around = [from, 0.5 * (from + to), to].map(|share| within(share, far));
+        let holds = inside + aside <= far && self.stays_left(by, around, 3.0 * piece.bend);
         Some(Value { here, possible: if holds { here + aside } else { f64::INFINITY } })
     }
 
@@ -206,15 +195,19 @@ mod tests {
         }
     }
 
-    /// The side of a flat end mill reaches over a border by less than the tolerance: nothing, on cells whose
-    /// places lie on the border, too.
+    /// The side of a flat end mill reaches over a border by less than the tolerance: as deep as what is left
+    /// is near, on cells whose places lie on the border, too.
     #[test]
-    fn a_vertical_side_over_a_border_counts_nothing_on_cells_of_every_size() {
+    fn a_vertical_side_over_a_border_counts_as_far_as_it_is_over_on_cells_of_every_size() {
         let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
-        let plunge = [10.0, -0.05].map(|z| Point3::new(-2.999, 0.13, z)).to_vec();
-        for cell in CELLS {
-            let found = gouge_of(&part, &flat, std::slice::from_ref(&plunge), cell);
-            assert!(found.max_depth_mm < 1e-6 && found.regions.is_empty(), "{cell}: {found:?}");
+        for over in [0.001, 0.0045] {
+            let plunge = [10.0, -0.05].map(|z| Point3::new(over - 3.0, 0.13, z)).to_vec();
+            for cell in CELLS {
+                let found = gouge_of(&part, &flat, std::slice::from_ref(&plunge), cell);
+                let off = (found.max_depth_mm - over).abs();
+                assert!(off <= found.error_bound_mm && off < 5e-6, "{cell}: {over} {found:?}");
+                assert!(found.regions.is_empty(), "{cell}: {found:?}");
+            }
         }
     }
 
