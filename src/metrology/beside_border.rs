@@ -12,11 +12,12 @@ use super::border_cuts::{BorderPiece, pieces};
 use super::closer::Value;
 use super::cut_surface::Deviation;
 use super::figures::NUMERICAL_FLOOR;
-use super::inspection::Inspection;
-use geometry::{CurveSegment, Point3, SegmentGrid, Vector2, Vector3, share_on};
+use super::inspection::{Inspection, Sample};
+use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector2, Vector3, share_on};
 use motion::Cutters;
 use part::Part;
 use sim::NOT_CUT;
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Halvings by which the way out through a border is found.
 const OUT_HALVINGS: usize = 40;
@@ -42,18 +43,29 @@ impl Borders {
         Self { pieces, in_plan, bend }
     }
 
+    /// Whether pieces may come nearer than `far` mm to a place of the plan.
+    fn come_near(&self, q: Point2, far: f64) -> bool {
+        let reach = Vector2::repeat(far + self.bend);
+        let [low, high] = [q - reach, q + reach];
+        let mut comes_near = false;
+        self.in_plan.near(&[low, high], |k| comes_near |= self.meets(k, &low, &high));
+        comes_near
+    }
+
+    /// Whether the box around a piece's chord meets another one, in the plan.
+    fn meets(&self, piece: u32, low: &Point2, high: &Point2) -> bool {
+        let [a, b] = self.pieces[piece as usize].ends.map(|end| end.xy());
+        let (from, to) = (a.inf(&b), a.sup(&b));
+        (0..2).all(|c| from[c] <= high[c] && to[c] >= low[c])
+    }
+
     /// The pieces that come nearer than `far` mm in the plan to the box around two places.
     fn near(&self, a: &Point3, b: &Point3, far: f64) -> Vec<&BorderPiece> {
         let reach = Vector2::repeat(far + self.bend);
         let [low, high] = [a.xy().inf(&b.xy()) - reach, a.xy().sup(&b.xy()) + reach];
-        let meets = |k: &u32| {
-            let [a, b] = self.pieces[*k as usize].ends.map(|end| end.xy());
-            let (from, to) = (a.inf(&b), a.sup(&b));
-            (0..2).all(|c| from[c] <= high[c] && to[c] >= low[c])
-        };
         let mut found = Vec::new();
         self.in_plan.near(&[low, high], |k| found.push(k));
-        found.retain(meets);
+        found.retain(|k| self.meets(*k, &low, &high));
         found.sort_unstable();
         found.dedup();
         found.into_iter().map(|k| &self.pieces[k as usize]).collect()
@@ -61,6 +73,37 @@ impl Borders {
 }
 
 impl Inspection<'_> {
+    /// The cells whose cut beside a border counts for less than along the normal, with their deviation as it
+    /// counts, mm.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn counted_beside_borders(
+        &self,
+        samples: &[Sample],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(usize, f32)>, Cancelled> {
+        let Some(borders) = self.borders else { return Ok(Vec::new()) };
+        let of_cell = |k: usize| {
+            let depth = -f64::from(samples[k].deviation);
+            let centre = self.centre(k);
+            // No normal leads farther aside than it is long.
+            if !(depth > NUMERICAL_FLOOR && borders.come_near(centre, self.limits.gouge.max(depth))) {
+                return None;
+            }
+            let design = self.design_at(centre)?;
+            let (cut, _) = self.along_normal(&design.point, &design.normal)?;
+            let counted = self.beside_border(&design.point, &design.normal, &cut, &[], 0.0)?;
+            Some((k, -counted.here as f32))
+        };
+        let nx = self.grid.nx;
+        let rows = work::parallel::try_map(self.grid.ny, |j| {
+            monitor::check(monitor)?;
+            Ok((j * nx..(j + 1) * nx).filter_map(of_cell).collect::<Vec<_>>())
+        })?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
     /// How deep a cut counts at a place that lies beside a border, and at most as far as `aside` mm around;
     /// `None` where it is as deep as it is along the normal. `further` are moves that may be lowest between
     /// centres.
@@ -166,7 +209,7 @@ mod tests {
     use geometry::{Point3, TriangleMesh, Vector3};
     use part::Part;
 
-    use crate::flat_scene::{LIMITS, gouge_of, plane};
+    use crate::flat_scene::{LIMITS, gouge_of, measured_of, plane};
 
     const CELLS: [f64; 5] = [0.005, 0.01, 0.03, 0.1, 0.4];
 
@@ -228,6 +271,28 @@ mod tests {
             let aside = beside / 2f64.sqrt();
             let found = gouge_of(&part, &ball, &[plunge(-aside, -aside, -down(beside))], cell);
             assert!(found.max_depth_mm + found.error_bound_mm < LIMITS.gouge, "{cell}: {found:?}");
+        }
+    }
+
+    /// The least deviation of the cells is no deeper than the deepest cut, though a flank stands deep beside
+    /// places that lie on the border.
+    #[test]
+    fn cells_beside_a_border_count_as_deep_as_the_deepest_cut_at_most() {
+        let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
+        let ball = Cutter::ball(6.0).unwrap();
+        for (cutter, tip) in [
+            (flat, Point3::new(0.0045 - 3.0, 0.13, -0.05)),
+            (flat, Point3::new(-2.9985, -0.001, -0.05)),
+            (ball, Point3::new(-2.9, 0.13, (9.0f64 - 2.9018 * 2.9018).sqrt() - 3.0)),
+        ] {
+            let plunge = [Point3::new(tip.x, tip.y, 10.0), tip].to_vec();
+            for cell in CELLS {
+                let found = measured_of(&part, &cutter, std::slice::from_ref(&plunge), cell);
+                let least = found.deviation_map.iter().fold(0f32, |a, b| a.min(*b));
+                let deepest = found.gouge.max_depth_mm;
+                assert!(f64::from(least) >= -deepest - 1e-7, "{cell}: {least} {deepest}");
+                assert_eq!(found.deviation.min_mm.map(|min| min.min(0.0) as f32), Some(least));
+            }
         }
     }
 }
