@@ -3,21 +3,21 @@
 //!
 //! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it,
 //! it goes on down the wall: what lies beyond belongs to no part. Where the side of a cutter reaches over a
-//! border by less than most of the gouge tolerance, what is left is as near, and the cut counts no deeper
-//! than that.
+//! border by less than the gouge tolerance, what is left is as near, and the cut counts no deeper than that.
 //!
 //! Enters: the part, a place of it, and the cut along its normal there. Leaves: how deep that counts, and at
 //! most around the place.
 
-use super::border_cuts::{BorderPiece, INSIDE_SHARE, least_way, pieces};
+use super::border_cuts::{BorderPiece, pieces};
 use super::closer::Value;
 use super::cut_surface::Deviation;
 use super::figures::NUMERICAL_FLOOR;
-use super::inspection::Inspection;
-use geometry::{CurveSegment, Point3, SegmentGrid, Vector2, Vector3, share_on};
+use super::inspection::{Inspection, Sample};
+use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector2, Vector3, share_on};
 use motion::Cutters;
 use part::Part;
 use sim::NOT_CUT;
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Halvings by which the way out through a border is found.
 const OUT_HALVINGS: usize = 40;
@@ -43,18 +43,29 @@ impl Borders {
         Self { pieces, in_plan, bend }
     }
 
+    /// Whether pieces may come nearer than `far` mm to a place of the plan.
+    fn come_near(&self, q: Point2, far: f64) -> bool {
+        let reach = Vector2::repeat(far + self.bend);
+        let [low, high] = [q - reach, q + reach];
+        let mut comes_near = false;
+        self.in_plan.near(&[low, high], |k| comes_near |= self.meets(k, &low, &high));
+        comes_near
+    }
+
+    /// Whether the box around a piece's chord meets another one, in the plan.
+    fn meets(&self, piece: u32, low: &Point2, high: &Point2) -> bool {
+        let [a, b] = self.pieces[piece as usize].ends.map(|end| end.xy());
+        let (from, to) = (a.inf(&b), a.sup(&b));
+        (0..2).all(|c| from[c] <= high[c] && to[c] >= low[c])
+    }
+
     /// The pieces that come nearer than `far` mm in the plan to the box around two places.
     fn near(&self, a: &Point3, b: &Point3, far: f64) -> Vec<&BorderPiece> {
         let reach = Vector2::repeat(far + self.bend);
         let [low, high] = [a.xy().inf(&b.xy()) - reach, a.xy().sup(&b.xy()) + reach];
-        let meets = |k: &u32| {
-            let [a, b] = self.pieces[*k as usize].ends.map(|end| end.xy());
-            let (from, to) = (a.inf(&b), a.sup(&b));
-            (0..2).all(|c| from[c] <= high[c] && to[c] >= low[c])
-        };
         let mut found = Vec::new();
         self.in_plan.near(&[low, high], |k| found.push(k));
-        found.retain(meets);
+        found.retain(|k| self.meets(*k, &low, &high));
         found.sort_unstable();
         found.dedup();
         found.into_iter().map(|k| &self.pieces[k as usize]).collect()
@@ -62,6 +73,37 @@ impl Borders {
 }
 
 impl Inspection<'_> {
+    /// The cells whose cut beside a border counts for less than along the normal, with their deviation as it
+    /// counts, mm.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn counted_beside_borders(
+        &self,
+        samples: &[Sample],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(usize, f32)>, Cancelled> {
+        let Some(borders) = self.borders else { return Ok(Vec::new()) };
+        let of_cell = |k: usize| {
+            let depth = -f64::from(samples[k].deviation);
+            let centre = self.centre(k);
+            // No normal leads farther aside than it is long.
+            if !(depth > NUMERICAL_FLOOR && borders.come_near(centre, self.limits.gouge.max(depth))) {
+                return None;
+            }
+            let design = self.design_at(centre)?;
+            let (cut, _) = self.along_normal(&design.point, &design.normal)?;
+            let counted = self.beside_border(&design.point, &design.normal, &cut, &[], 0.0)?;
+            Some((k, -counted.here as f32))
+        };
+        let nx = self.grid.nx;
+        let rows = work::parallel::try_map(self.grid.ny, |j| {
+            monitor::check(monitor)?;
+            Ok((j * nx..(j + 1) * nx).filter_map(of_cell).collect::<Vec<_>>())
+        })?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
     /// How deep a cut counts at a place that lies beside a border, and at most as far as `aside` mm around;
     /// `None` where it is as deep as it is along the normal. `further` are moves that may be lowest between
     /// centres.
@@ -77,9 +119,9 @@ impl Inspection<'_> {
         if depth <= NUMERICAL_FLOOR {
             return None;
         }
-        let far = INSIDE_SHARE * self.limits.gouge;
+        let far = self.limits.gouge;
         let pieces = borders.near(p, &(p - normal * depth), far);
-        let left = pieces.iter().filter_map(|piece| self.near_left(piece, p, cut.by, aside));
+        let left = pieces.iter().filter_map(|piece| self.near_value(piece, p, cut.by, aside));
         let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();
         let moves: Vec<u32> = further.iter().copied().chain((cut.by != NOT_CUT).then_some(cut.by)).collect();
         let wall = self
@@ -99,11 +141,11 @@ impl Inspection<'_> {
 
     /// How far what a move leaves is from a place beside a piece, where that is near, and at most as far as
     /// `aside` mm around.
-    fn near_left(&self, piece: &BorderPiece, p: &Point3, by: u32, aside: f64) -> Option<Value> {
+    fn near_value(&self, piece: &BorderPiece, p: &Point3, by: u32, aside: f64) -> Option<Value> {
         if by == NOT_CUT {
             return None;
         }
-        let far = INSIDE_SHARE * self.limits.gouge;
+        let far = self.limits.gouge;
         let [a, b] = piece.ends.map(|end| end.xy());
         let share = share_on(&p.xy(), &a, &b);
         let (foot, _) = piece.design(self.part, share);
@@ -112,23 +154,13 @@ impl Inspection<'_> {
         if inside > far || (way - piece.inward * inside).norm() > NUMERICAL_FLOOR + piece.bend {
             return None;
         }
-        let is_left = |share: f64, far: f64| {
-            let place = piece.design(self.part, share).0 + piece.inward_by(share, far);
-            Some(place.z <= self.surface.envelope.height(by, place.x, place.y)?)
-        };
-        let here = match is_left(share, far) {
-            Some(false) => return None,
-            Some(true) => {
-                let left = |far: f64| is_left(share, far) == Some(true);
-                (foot + piece.inward_by(share, least_way(far, left)) - p).norm()
-            }
-            // As little as the border itself counts where a move does not pass beside it, as beside a
-            // vertical flank.
-            None => 0.0,
-        };
-        let along = aside / (b - a).norm();
-        let around = [share - along, share + along].map(|share| share.clamp(0.0, 1.0));
-        let holds = inside + aside <= far && around.iter().all(|share| is_left(*share, far) != Some(false));
+        let within = |share: f64, far: f64| piece.design(self.part, share).0 + piece.inward_by(share, far);
+        let here = self.near_left(piece, by, share, p)?;
+        // Before an end, where another border may begin, what counts as near is one place.
+        let (along, end) = (aside / (b - a).norm(), piece.end(far));
+        let [from, to] = [share - along, share + along].map(|share| share.clamp(end, 1.0 - end));
+        let around = [from, 0.5 * (from + to), to].map(|share| within(share, far));
+        let holds = inside + aside <= far && self.stays_left(by, around, 3.0 * piece.bend);
         Some(Value { here, possible: if holds { here + aside } else { f64::INFINITY } })
     }
 
@@ -177,7 +209,7 @@ mod tests {
     use geometry::{Point3, TriangleMesh, Vector3};
     use part::Part;
 
-    use crate::flat_scene::{LIMITS, gouge_of, plane};
+    use crate::flat_scene::{LIMITS, gouge_of, measured_of, plane};
 
     const CELLS: [f64; 5] = [0.005, 0.01, 0.03, 0.1, 0.4];
 
@@ -206,15 +238,19 @@ mod tests {
         }
     }
 
-    /// The side of a flat end mill reaches over a border by less than the tolerance: nothing, on cells whose
-    /// places lie on the border, too.
+    /// The side of a flat end mill reaches over a border by less than the tolerance: as deep as what is left
+    /// is near, on cells whose places lie on the border, too.
     #[test]
-    fn a_vertical_side_over_a_border_counts_nothing_on_cells_of_every_size() {
+    fn a_vertical_side_over_a_border_counts_as_far_as_it_is_over_on_cells_of_every_size() {
         let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
-        let plunge = [10.0, -0.05].map(|z| Point3::new(-2.999, 0.13, z)).to_vec();
-        for cell in CELLS {
-            let found = gouge_of(&part, &flat, std::slice::from_ref(&plunge), cell);
-            assert!(found.max_depth_mm < 1e-6 && found.regions.is_empty(), "{cell}: {found:?}");
+        for over in [0.001, 0.0045] {
+            let plunge = [10.0, -0.05].map(|z| Point3::new(over - 3.0, 0.13, z)).to_vec();
+            for cell in CELLS {
+                let found = gouge_of(&part, &flat, std::slice::from_ref(&plunge), cell);
+                let off = (found.max_depth_mm - over).abs();
+                assert!(off <= found.error_bound_mm && off < 5e-6, "{cell}: {over} {found:?}");
+                assert!(found.regions.is_empty(), "{cell}: {found:?}");
+            }
         }
     }
 
@@ -235,6 +271,28 @@ mod tests {
             let aside = beside / 2f64.sqrt();
             let found = gouge_of(&part, &ball, &[plunge(-aside, -aside, -down(beside))], cell);
             assert!(found.max_depth_mm + found.error_bound_mm < LIMITS.gouge, "{cell}: {found:?}");
+        }
+    }
+
+    /// The least deviation of the cells is no deeper than the deepest cut, though a flank stands deep beside
+    /// places that lie on the border.
+    #[test]
+    fn cells_beside_a_border_count_as_deep_as_the_deepest_cut_at_most() {
+        let (part, flat) = (plane([0.4, 0.3]), Cutter::flat(6.0).unwrap());
+        let ball = Cutter::ball(6.0).unwrap();
+        for (cutter, tip) in [
+            (flat, Point3::new(0.0045 - 3.0, 0.13, -0.05)),
+            (flat, Point3::new(-2.9985, -0.001, -0.05)),
+            (ball, Point3::new(-2.9, 0.13, (9.0f64 - 2.9018 * 2.9018).sqrt() - 3.0)),
+        ] {
+            let plunge = [Point3::new(tip.x, tip.y, 10.0), tip].to_vec();
+            for cell in CELLS {
+                let found = measured_of(&part, &cutter, std::slice::from_ref(&plunge), cell);
+                let least = found.deviation_map.iter().fold(0f32, |a, b| a.min(*b));
+                let deepest = found.gouge.max_depth_mm;
+                assert!(f64::from(least) >= -deepest - 1e-7, "{cell}: {least} {deepest}");
+                assert_eq!(found.deviation.min_mm.map(|min| min.min(0.0) as f32), Some(least));
+            }
         }
     }
 }

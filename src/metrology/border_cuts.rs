@@ -20,17 +20,13 @@ use super::facing::LEAST_FACING;
 use super::figures::{GougeFigures, NUMERICAL_FLOOR};
 use super::inspection::{Inspection, Sample};
 use cutter::Cutter;
-use geometry::{Point2, Point3, Vector3, share_on};
+use geometry::{Point2, Point3, Vector3, distance_to_segment, share_on};
 use motion::Cutters;
 use part::{Part, PatchPoint};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Pieces of borders are no longer than this many radii of the narrowest cutter.
 const LONGEST_PIECE: f64 = 2.0;
-
-/// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it
-/// is √2 times as far off.
-pub(super) const INSIDE_SHARE: f64 = 0.65;
 
 /// Halvings by which the way to what is left is found: to a ten-millionth of the farthest.
 const INSIDE_HALVINGS: usize = 24;
@@ -69,8 +65,8 @@ struct BorderCut {
 struct PlaceDepth {
     /// Along the normal or the wall.
     along: f64,
-    /// As far inside of all borders as counts as near, along z; negative where nothing is cut there.
-    inside: f64,
+    /// Whether the move cuts nothing as far inside of all borders as counts as near.
+    is_left: bool,
 }
 
 /// The design at a share of the side of a triangle, whose ends have parameters on a patch, and the normal
@@ -103,7 +99,7 @@ impl BorderPiece {
 
     /// As far from the end of the piece, where another border may begin, as from the border: as a share of
     /// it.
-    fn end(&self, far: f64) -> f64 {
+    pub fn end(&self, far: f64) -> f64 {
         (far / (self.ends[1] - self.ends[0]).norm()).min(0.5)
     }
 
@@ -277,31 +273,78 @@ impl Inspection<'_> {
         Ok(())
     }
 
+    /// Whether a move cuts nothing at a place.
+    pub fn is_left(&self, by: u32, place: &Point3) -> bool {
+        self.surface.envelope.height(by, place.x, place.y).is_none_or(|cut| place.z <= cut)
+    }
+
+    /// Whether a move cuts nothing between two places with another half way, on a line that bends by so much,
+    /// mm: how deep it cuts is a concave function there, and so is how far it comes over the line.
+    pub fn stays_left(&self, by: u32, places: [Point3; 3], bend: f64) -> bool {
+        let (from, to) =
+            (self.surface.path.start_of(by as usize), self.surface.path.moves[by as usize].to.tip);
+        let radius = self.cutters.of_move(by).radius();
+        let over = places.map(|p| radius - distance_to_segment(&p.xy(), &from.xy(), &to.xy()));
+        let deep = places.map(|p| p.z - self.surface.height(by, p.x, p.y));
+        let is_left = |values: [f64; 3]| {
+            values.iter().all(|value| value.is_finite()) && concave_most(values) + bend <= 0.0
+        };
+        is_left(over) || is_left(deep)
+    }
+
+    /// How far what a move leaves of the design is from a place beside a share of a piece, mm, where that is
+    /// near: it leaves what lies so far within all borders. The least of the ways into the part from all borders
+    /// or one of them, and away from the move.
+    pub fn near_left(&self, piece: &BorderPiece, by: u32, share: f64, place: &Point3) -> Option<f64> {
+        let far = self.limits.gouge;
+        let (foot, normal) = piece.design(self.part, share);
+        let is_left = |to: &dyn Fn(f64) -> Point3, far: f64| self.is_left(by, &to(far));
+        let within = |way: f64| foot + piece.inward_by(share, way);
+        if !is_left(&within, far) {
+            return None;
+        }
+        let [from, to] =
+            [self.surface.path.start_of(by as usize), self.surface.path.moves[by as usize].to.tip];
+        let nearest = from.xy() + (to - from).xy() * share_on(&place.xy(), &from.xy(), &to.xy());
+        let out = place.xy() - nearest;
+        let out = Vector3::new(out.x, out.y, -normal.xy().dot(&out) / normal.z);
+        let out = out.try_normalize(0.0).unwrap_or_default();
+        let ways: [&dyn Fn(f64) -> Point3; 3] = [
+            &|way| foot + piece.inward * way,
+            // Along the border, where another one begins.
+            &|way| within(way) - piece.inward * way,
+            &|way| place + out * way,
+        ];
+        let lengths = ways.iter().filter(|to| is_left(to, far)).filter_map(|to| {
+            let left = to(least_way(far, |way| is_left(to, way)));
+            let seen = left + piece.inward * NUMERICAL_FLOOR;
+            let top = self.part.highest_at(seen.x, seen.y)?;
+            let length = (left - place).norm();
+            ((top.point.z - seen.z).abs() <= NUMERICAL_FLOOR + piece.bend + 0.1 * length).then_some(length)
+        });
+        let all = (within(least_way(far, |way| is_left(&within, way))) - place).norm();
+        Some(lengths.fold(all, f64::min))
+    }
+
     /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a
     /// share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
         let design = |share: f64| piece.design(self.part, share);
         let length = (piece.ends[1] - piece.ends[0]).norm();
-        let far = INSIDE_SHARE * self.limits.gouge;
+        let far = self.limits.gouge;
         let end = |far: f64| piece.end(far);
         let inward = |share: f64, far: f64| piece.inward_by(share, far);
-        let inside = |share: f64, far: f64| {
-            let nearby = design(share).0 + inward(share, far);
-            Some(nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?)
-        };
+        let within = |share: f64, far: f64| design(share).0 + inward(share, far);
         let value = |share: f64| {
             let (place, normal) = design(share);
-            let inside = inside(share, far)?;
+            let is_left = self.is_left(by, &within(share, far));
             let mut along = depth(self.surface, by, &place, &normal)?;
             if along.is_infinite() || piece.leads_out(&normal) {
                 along = along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?);
             }
-            Some(PlaceDepth { along, inside })
+            Some(PlaceDepth { along, is_left })
         };
-        // How far what is left is away, where it is near; the way to where nothing is cut for certain.
-        let near = |share: f64| {
-            inward(share, least_way(far, |far| inside(share, far).is_some_and(|inside| inside <= 0.0))).norm()
-        };
+        let near = |share: f64| self.near_left(piece, by, share, &design(share).0);
         // On a ridge the cut may be less deep than along the normal.
         let on_ridge = |share: f64, along: f64| {
             let (place, normal) = design(share);
@@ -321,9 +364,9 @@ impl Inspection<'_> {
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<PlaceDepth>| {
             let most = best.map_or(known, |(most, _)| most.max(known));
-            let Some(PlaceDepth { mut along, inside }) = found else { return (most, None) };
-            if inside <= 0.0 && along > most {
-                along = along.min(near(share));
+            let Some(PlaceDepth { mut along, is_left }) = found else { return (most, None) };
+            if is_left && along > most {
+                along = near(share).map_or(along, |near| near.min(along));
             }
             if along > most && along.is_finite() {
                 let (place, normal) = design(share);
@@ -356,14 +399,15 @@ impl Inspection<'_> {
                     let bend = bend * (b - a) * (b - a);
                     let along = concave_most([at_a.along, at_m.along, at_b.along]) + bend;
                     let is_left = |far: f64| {
-                        let inside = [a, m, b].map(|share| inside(share, far).unwrap_or(f64::INFINITY));
-                        !is_kinked(far) && concave_most(inside) + bend <= 0.0
+                        !is_kinked(far) && self.stays_left(by, [a, m, b].map(|s| within(s, far)), bend)
                     };
                     if along > most && is_left(far) {
                         let far = least_way(far, is_left);
-                        along.min(
-                            [a, b].map(|share| inward(share, far).norm()).into_iter().fold(0.0, f64::max),
-                        )
+                        let ways = [a, b].map(|share| inward(share, far).norm());
+                        // What is near one place is no farther from another than they are from each other.
+                        let aside = 0.5 * (b - a) * length + bend;
+                        let nearby = near(m).map_or(f64::INFINITY, |near| near + aside);
+                        along.min(ways.into_iter().fold(0.0, f64::max)).min(nearby)
                     } else {
                         along
                     }
@@ -479,7 +523,7 @@ mod tests {
             let is_cut = |x: f64| tip + 3.0 - (9.0 - (beside + x).powi(2)).sqrt() < 3.6 - 0.45 * x;
             let way =
                 (0..100_000).map(|k| 1e-7 * f64::from(k)).find(|x| !is_cut(*x)).unwrap() * 0.45f64.hypot(1.0);
-            let truth = if way < INSIDE_SHARE * LIMITS.gouge { way.min(deep) } else { deep };
+            let truth = if way < LIMITS.gouge { way.min(deep) } else { deep };
             let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[plunge], 0.1);
             let off = (found.max_depth_mm - truth).abs();
             assert!(off <= found.error_bound_mm + 1e-6 && off < 1e-5, "{beside} {truth}: {found:?}");
@@ -542,17 +586,28 @@ mod tests {
         }
     }
 
-    /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it
-    /// stands. By more it is one.
+    /// The side of a flat end mill reaches over the border by less than the tolerance: as deep as it is over,
+    /// for what is left is as near, and no gouge as deep as it stands. By more it is one.
     #[test]
     fn the_side_of_a_cutter_is_no_gouge_as_far_as_the_tolerance_lets_it() {
         let flat = Cutter::flat(6.0).unwrap();
-        let [little, much] = [2.999, 2.98].map(|x| gouge(&flat, Point3::new(-x, 3.0, -2.0), 0.1));
-        assert!(little.max_depth_mm < 1e-6, "{little:?}");
-        assert!((much.max_depth_mm - 2.0).abs() < 1e-6, "{much:?}");
+        let deepest = |x: f64, y: f64, z: f64| gouge(&flat, Point3::new(x, y, z), 0.1).max_depth_mm;
+        for over in [0.0, 1e-4, 0.00177, 0.003, 0.0049] {
+            let found = deepest(over - 3.0, 3.0, -2.0);
+            assert!((found - over).abs() < 2e-6, "{over} {found}");
+        }
+        assert!((deepest(-2.98, 3.0, -2.0) - 2.0).abs() < 1e-6);
         // At a corner it comes over the part beside one of the borders only.
-        let corner = gouge(&flat, Point3::new(-2.99975, 0.0027, -0.3), 0.1);
-        assert!(corner.max_depth_mm < 1e-6, "{corner:?}");
+        let corner = deepest(-2.99975, 0.0027, -0.3);
+        assert!((corner - 0.00025).abs() < 2e-6, "{corner}");
+        // A corner from all sides: the rim of the cutter is the nearest place that is left.
+        for degrees in [181.0, 200.0, 225.0, 260.0, 269.0f64] {
+            for over in [0.0005, 0.0021, 0.003] {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let found = deepest((3.0 - over) * cos, (3.0 - over) * sin, -0.3);
+                assert!((found - over).abs() < 2e-6, "{degrees} {over} {found}");
+            }
+        }
     }
 
     /// A ball comes half a micrometre too near to the corner of a slope, its flank along the normal: what is

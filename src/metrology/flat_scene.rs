@@ -7,7 +7,7 @@ use part::Part;
 use sim::{Grid, ZMap, cut};
 use work::monitor::Silent;
 
-use crate::figures::{GougeFigures, Limits};
+use crate::figures::{GougeFigures, Limits, Measurement};
 use crate::{Asked, measure};
 
 /// What [`gouge_of`] judges by.
@@ -35,6 +35,11 @@ pub(super) fn plane([x, y]: [f64; 2]) -> Part {
 /// What a cutter cuts too deep from a block a millimetre higher than a part, along passes of its tip, by
 /// cells.
 pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cell: f64) -> GougeFigures {
+    measured_of(part, cutter, passes, cell).gouge
+}
+
+/// All that is measured of such a cut.
+pub(super) fn measured_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cell: f64) -> Measurement {
     let path = path(passes);
     let top = part.bounds().max.z + 1.0;
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
@@ -50,5 +55,5 @@ pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cel
     };
     // How high what is left stands is of no account.
     let limits = Limits { scallop: 1e3, uncut: 1e3, ..LIMITS };
-    measure(part, cutter, &path, &cut, &limits, &asked, &Silent).unwrap().gouge
+    measure(part, cutter, &path, &cut, &limits, &asked, &Silent).unwrap()
 }

@@ -146,7 +146,7 @@ impl Inspection<'_> {
     }
 
     /// The deviation at a place of the design, and whether a wall beside it accounts for it.
-    fn along_normal(&self, p: &Point3, normal: &Vector3) -> Option<(Deviation, bool)> {
+    pub fn along_normal(&self, p: &Point3, normal: &Vector3) -> Option<(Deviation, bool)> {
         self.along_normal_with(p, normal, &[])
     }
 
@@ -252,7 +252,7 @@ impl Inspection<'_> {
     }
 
     /// Centre of cell `k`.
-    fn centre(&self, k: usize) -> Point2 {
+    pub fn centre(&self, k: usize) -> Point2 {
         self.grid.centre(k % self.grid.nx, k / self.grid.nx)
     }
 

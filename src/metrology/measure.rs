@@ -102,6 +102,8 @@ pub(crate) fn measure_with_walls(
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
+    let mut deviation_map: Vec<f32> = found.samples.iter().map(|s| s.deviation).collect();
+    found.counted.iter().for_each(|(k, counted)| deviation_map[*k] = *counted);
     let hidden = found.ridges.hidden.clone();
     let pairs = pair_figures(part, cutters, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
     let mut above = std::mem::take(&mut found.ridges.above);
@@ -117,7 +119,7 @@ pub(crate) fn measure_with_walls(
         deviation: found.deviation,
         ridge_samples: std::mem::take(&mut found.ridges.samples),
         pairs,
-        deviation_map: found.samples.iter().map(|s| s.deviation).collect(),
+        deviation_map,
         refined: CloserLook::default(),
     };
     let hiding = inspection.raise_by_moves(path, &found.samples, &mut measured.gouge, monitor)?;

@@ -21,12 +21,15 @@ pub(super) const QUARTERS: [f64; 2] = [0.25, 0.75];
 /// Floors and tops that rise by more than this from end to end are steps within the strip.
 const STEEPEST: f64 = 5.0;
 
-/// How far beyond the end of a facet the wall's turn is looked for, mm, and how far aside at most, over that.
-const AHEAD: f64 = 1e-2;
-const MOST_ASIDE: f64 = 64.0;
-const HALVINGS: usize = 24;
+/// How far around the end of a facet the wall's turn is looked for, mm.
+const AROUND: f64 = 1e-2;
+const HALVINGS: usize = 32;
 
-/// Turns by less than this tangent are none.
+/// A turn is told to so much, rad. It counts as greater by that, so that of walls that are cut equally deep
+/// the one that is cut along its normal comes first.
+const TURN_ROUNDING: f64 = 1e-8;
+
+/// Turns by less than this angle are none, rad.
 const STRAIGHT: f64 = 1e-3;
 
 /// A strip of a wall. `u` runs along it from 0 to its length, z up.
@@ -132,23 +135,23 @@ impl WallPiece {
         self.floor = self.extended(floor, f64::min);
         self.top = self.extended(top, f64::max);
         // No farther than a neighbour of the same length goes: what lies beyond that one turns more.
-        let ahead = AHEAD.min(self.beyond[0] + self.length + self.beyond[1]);
-        let sides = [(0, -self.beyond[0] - ahead), (1, self.length + self.beyond[1] + ahead)];
+        let around = AROUND.min(self.beyond[0] + self.length + self.beyond[1]);
+        let sides = [(0, -self.beyond[0], -1.0), (1, self.length + self.beyond[1], 1.0)];
         let level = self.middle().0.z;
-        for (side, u) in sides {
-            let end = [0.0, self.length][side];
+        for (side, end, out) in sides {
             let rise = (self.top[1] - self.top[0]) / self.length;
-            let top = self.top[side] + rise * (u - end);
+            let top = self.top[side] + rise * (end - [0.0, self.length][side]);
             // A cut from the top leads out over a lower one beyond the end; tops that fall no more than a
             // slope does are the same one.
-            let behind = |aside: f64| level.max(top - STEEPEST * (ahead + aside));
-            let is_solid =
-                |aside: f64, level: f64| height_at(part, &self, u, aside).is_some_and(|z| z >= level);
+            let behind = level.max(top - STEEPEST * around);
+            let is_solid = |turn: f64, aside: f64, level: f64| {
+                let (sin, cos) = turn.sin_cos();
+                let (u, aside) = (end + out * around * cos, aside * around * sin);
+                height_at(part, &self, u, aside).is_some_and(|z| z >= level)
+            };
             // Behind a convex edge material begins aside, before a concave one it ends there.
-            let slopes = [
-                medial(ahead, &|aside| !is_solid(-aside, behind(aside))),
-                medial(ahead, &|aside| is_solid(aside, level)),
-            ];
+            let slopes =
+                [medial(&|turn| !is_solid(turn, -1.0, behind)), medial(&|turn| is_solid(turn, 1.0, level))];
             [self.behind[side], self.before[side]] = slopes;
         }
         self
@@ -174,23 +177,18 @@ fn height_at(part: &Part, piece: &WallPiece, u: f64, aside: f64) -> Option<f64> 
     part.highest_at(q.x, q.y).map(|design| design.point.z)
 }
 
-/// How fast the medial axis at the end of a wall leaves it, where the wall turns so that `holds` up to some
-/// way aside, so far `ahead`, mm.
-fn medial(ahead: f64, holds: &dyn Fn(f64) -> bool) -> f64 {
-    if !holds(STRAIGHT * ahead) {
+/// How fast the medial axis at the end of a wall leaves it, where the wall turns by the angle up to which
+/// `holds`: the axis halves the angle between both walls.
+fn medial(holds: &dyn Fn(f64) -> bool) -> f64 {
+    if !holds(STRAIGHT) {
         return f64::INFINITY;
     }
-    let (mut within, mut out) = (STRAIGHT * ahead, MOST_ASIDE * ahead);
-    if holds(out) {
-        // A right angle, or one so near to it or beyond that a place aside does not tell.
-        return 1.0;
-    }
+    let (mut within, mut out) = (STRAIGHT, std::f64::consts::PI);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (within + out);
         *(if holds(middle) { &mut within } else { &mut out }) = middle;
     }
-    let turn = (within / ahead).atan();
-    1.0 / (0.5 * turn).tan()
+    1.0 / (0.5 * (out + TURN_ROUNDING)).min(std::f64::consts::FRAC_PI_2).tan()
 }
 
 /// The vertical facets of a mesh in strips no longer than `longest` mm.

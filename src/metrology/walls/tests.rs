@@ -393,3 +393,46 @@ fn a_cutter_that_touches_a_wall_cuts_none_across_it() {
         assert!((deepest - depth).abs() < 2e-6, "{depth} {:?}", measured.gouge);
     }
 }
+
+/// A block whose plan is a polygon of corners that turn left, from z = 0 to a height.
+fn prism(corners: &[[f64; 2]], high: f64) -> Part {
+    let n = corners.len() as u32;
+    let ring = |z: f64| corners.iter().map(move |&[x, y]| Point3::new(x, y, z));
+    let walls = (0..n).flat_map(|k| {
+        let next = (k + 1) % n;
+        [[k, next, n + next], [k, n + next, n + k]]
+    });
+    let ends = (1..n - 1).flat_map(|k| [[0, k + 1, k], [n, n + k, n + k + 1]]);
+    let triangles = walls.chain(ends).collect();
+    Part::from_mesh(TriangleMesh::new(ring(0.0).chain(ring(high)).collect(), triangles).unwrap().0)
+}
+
+/// What a cut past the end of a wall takes off is as deep as it is far from the nearer of both walls: at
+/// corners of any angle, and where the top beyond the end is lower by any step.
+#[test]
+fn a_cut_past_the_end_of_a_wall_is_as_deep_as_the_nearer_wall_is_far() {
+    let (radius, deep) = (3.0, 0.5);
+    for low in [0.5, 2.0, 3.0, 4.5] {
+        let part = steps([[0.0, 7.0, 15.0, 20.0], [0.0, 4.0, 8.0, 12.0]], [[low, HEIGHT, HEIGHT]; 3]);
+        let mut path = faced_and_around(radius, HEIGHT, [0.0; 4], 0.0);
+        let x = 7.0 - radius + deep;
+        let along = [[0.5, -8.0, 20.0], [x, -8.0, low], [x, 20.0, low], [x, 20.0, 20.0]];
+        path.moves.extend(path_through(along.map(Point3::from)).moves);
+        let gouge = measured(&part, &Cutter::flat(2.0 * radius).unwrap(), &path).gouge;
+        let off = (gouge.max_depth_mm - deep).abs();
+        assert!(off <= gouge.error_bound_mm && off < 1e-6, "{low} {gouge:?}");
+    }
+    // A way along one wall that cuts it as deep, past the end where the other wall begins at an angle.
+    for degrees in [30.0, 50.0, 90.0, 130.0, 150.0f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let part = prism(
+            &[[0.0, 0.0], [20.0, 0.0], [20.0 + 12.0 * cos, 12.0 * sin], [12.0 * cos, 12.0 * sin]],
+            HEIGHT,
+        );
+        let y = deep - radius;
+        let path = path_through([[-30.0, y, 20.0], [-30.0, y, -1.0], [50.0, y, -1.0]].map(Point3::from));
+        let gouge = measured(&part, &Cutter::flat(2.0 * radius).unwrap(), &path).gouge;
+        let off = (gouge.max_depth_mm - deep).abs();
+        assert!(off <= gouge.error_bound_mm && off < 1e-6, "{degrees} {gouge:?}");
+    }
+}
