@@ -15,6 +15,9 @@ use crate::figures::NUMERICAL_FLOOR;
 /// Rounds in which the ball shrinks; each leaves a small part of what is too large.
 const SHRINKING: usize = 30;
 
+/// Halvings by which the greatest ball around a place is bounded: each makes the bound half as wide.
+const HALVINGS: usize = 16;
+
 /// Faces are a sharp ridge, or the sides of something thin, where their unit normals have no greater product:
 /// 75 degrees between them. On a blunter ridge the way along a normal is less than four times as long as what
 /// is lost.
@@ -94,16 +97,51 @@ pub(crate) fn corner_at(
 pub(crate) struct Bounding<'a> {
     /// The places of the surface that do.
     pub counts: &'a dyn Fn(&SurfacePoint) -> bool,
-    /// Whether the walls below the borders of a sheet do where the way down leads out through them.
-    pub walls: bool,
+    /// The walls below the borders of a sheet do where the product of their unit normal and that of the place
+    /// is less than this: below 0 the way down leads out through them. `None` where none do.
+    pub walls: Option<f64>,
 }
 
 /// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the
 /// thickness there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using
 /// nearest neighbors and the normal field", 2012).
 pub(crate) fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
-    let all = Bounding { counts: &|_| true, walls: false };
+    let all = Bounding { counts: &|_| true, walls: None };
     thinner(part, point, normal, most, all).map_or(most, |thin| thin.radius)
+}
+
+/// As [`ball_beneath`], not through the walls below the borders of a sheet either.
+pub(crate) fn ball_within_borders(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
+    let all = Bounding { counts: &|_| true, walls: Some(SHARP) };
+    thinner(part, point, normal, most, all).map_or(most, |thin| thin.radius)
+}
+
+/// No ball that touches the part from inside, at a place no farther than `aside` mm from this one, is larger
+/// than this, mm, or than `most`: where something stands nearer to the centre of a ball about the line
+/// through `point` than its radius less `aside`, it stands within that of every such place.
+pub(crate) fn ball_beneath_at_most(
+    part: &Part,
+    point: &Point3,
+    normal: &Vector3,
+    aside: f64,
+    most: f64,
+) -> f64 {
+    let is_too_large = |radius: f64| {
+        let (centre, within) = (point - normal * radius, radius - aside - NUMERICAL_FLOOR);
+        let is_wall = |outward: &Vector3| normal.dot(outward) < SHARP;
+        within > 0.0
+            && (part.closest_point(&centre).1.abs() < within
+                || part.nearest_border_wall(&centre, within, &is_wall).is_some())
+    };
+    let (mut fits, mut too_large) = (0.0, most);
+    if !is_too_large(most) {
+        return most;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (fits + too_large);
+        *(if is_too_large(middle) { &mut too_large } else { &mut fits }) = middle;
+    }
+    too_large
 }
 
 /// The thickness beneath a place where a ball with this radius, mm, does not fit.
@@ -128,8 +166,9 @@ pub(crate) fn thinner(
         let (other, distance) = part.closest_point(&centre);
         let of_surface = (distance.abs() < inside && (bounding.counts)(&other))
             .then(|| (fits(&other.point), Some(other.normal)));
-        let leads_out = |outward: &Vector3| normal.dot(outward) < 0.0;
-        let wall = if bounding.walls { part.nearest_border_wall(&centre, inside, &leads_out) } else { None };
+        let wall = bounding.walls.and_then(|most| {
+            part.nearest_border_wall(&centre, inside, &|outward| normal.dot(outward) < most)
+        });
         let of_wall = wall.map(|place| (fits(&place), None));
         let nearest = of_surface.into_iter().chain(of_wall).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((fits, other)) = nearest.filter(|(fits, _)| *fits < radius) else { break };

@@ -173,7 +173,7 @@ impl Inspection<'_> {
             let is_below = highest.is_some_and(|highest| highest.point.z > other.point.z + NUMERICAL_FLOOR);
             other.normal.z > LEAST_FACING && !is_below
         };
-        let bounding = Bounding { counts: &is_highest, walls: false };
+        let bounding = Bounding { counts: &is_highest, walls: None };
         let thin = thinner(self.part, p, normal, depth, bounding)?;
         let ridges = thin.ridges(self.part, p, normal, depth, bounding);
         let cuts = ridges.flat_map(|normals| {

@@ -307,7 +307,7 @@ impl AlongNormal for SweptVolume<'_> {
             return look(ball_beneath(self.part, point, normal, self.inward));
         }
         let depth = if is_near { -found.deviation } else { self.inward };
-        let bounding = Bounding { counts: &|_| true, walls: true };
+        let bounding = Bounding { counts: &|_| true, walls: Some(0.0) };
         let Some(thin) = thinner(self.part, point, normal, depth, bounding) else {
             return if is_near { Some(found) } else { look(self.inward) };
         };

@@ -184,11 +184,21 @@ fn unseen_after(path: &Toolpath, cutters: &Cutters, margin: f64) -> Measurement 
 /// Also the distance of the places, mm, which is halved so often.
 fn unseen_closer(path: &Toolpath, cutters: &Cutters, margin: f64, halvings: i32) -> (Measurement, f64) {
     let profile = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0]];
-    let part = prism(&profile, 10.0, &[[0, 1, 2], [0, 2, 3]]);
-    let facing = Facing::new(&part, path, block(&part, margin));
-    let (grid, deviations) = all_cells(&part, 0.1);
+    unseen_of(&prism(&profile, 10.0, &[[0, 1, 2], [0, 2, 3]]), path, cutters, margin, halvings)
+}
+
+/// The same of any part.
+fn unseen_of(
+    part: &Part,
+    path: &Toolpath,
+    cutters: &Cutters,
+    margin: f64,
+    halvings: i32,
+) -> (Measurement, f64) {
+    let facing = Facing::new(part, path, block(part, margin));
+    let (grid, deviations) = all_cells(part, 0.1);
     let cells = CellsSeen { grid: &grid, deviations: &deviations, walls: false };
-    let coverage = Coverage::new(&part, &facing, Judged::All, Some(cells));
+    let coverage = Coverage::new(part, &facing, Judged::All, Some(cells));
     let stretches = cutters.stretches(path);
     let solids: Vec<Solid> = stretches.iter().map(|tool| Solid::of_cutter(tool.cutter, None)).collect();
     let rays = |k: usize| Rays::new(&stretches[k].path, &solids[k], &Silent).unwrap();
@@ -197,12 +207,12 @@ fn unseen_closer(path: &Toolpath, cutters: &Cutters, margin: f64, halvings: i32)
     let tools = (0..solids.len()).map(|k| (stretches[k].first, tool(k))).collect();
     let by_rays = RaysCutInTurn { tools };
     let cut = SweptVolume {
-        part: &part,
+        part,
         cut: &by_rays,
         inward: 3.0,
         outward: 3.0,
         shallow: 1e-6,
-        block: block(&part, margin),
+        block: block(part, margin),
     };
     let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1, halvings };
     coverage.measure_unseen(&task, &Silent).unwrap().unwrap()
@@ -268,4 +278,31 @@ fn walls_stand_as_far_as_the_block_and_are_cut_where_a_ball_passes() {
     // From the ball's middle at z = 5 upward; below as far as its arc is 5 µm deep.
     let below = (9.0f64 - (3.0 - 0.015f64).powi(2)).sqrt();
     assert!((gouged.gouge.area_mm2 / (20.0 * (5.0 + below)) - 1.0).abs() < 0.1, "{below} {:?}", gouged.gouge);
+}
+
+/// A flat plunges past the end of a wall of 89 degrees that hangs from a level top, both open sheets: it cuts
+/// the wall no deeper than it comes past its end. A touch is no cut.
+#[test]
+fn a_plunge_past_the_end_of_an_open_wall_is_as_deep_as_it_comes_over() {
+    let (high, radius) = (6.0, 3.0);
+    let out = high / 89f64.to_radians().tan();
+    let top = [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [20.0, 16.0, 0.0], [0.0, 16.0, 0.0]];
+    let foot = [[0.0, -out, -high], [20.0, -out, -high]];
+    let corners = top.into_iter().chain(foot).map(Point3::from).collect();
+    let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 1], [4, 1, 0]];
+    let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+    let cutters = Cutter::flat(2.0 * radius).unwrap().into();
+    for beside in [1.0, 0.2, -2.0f64] {
+        for over in [0.0, 1e-4, 0.02, 0.4] {
+            let at = |z: f64| Point3::new(over - radius, beside, z);
+            let path = path_through([at(10.0), at(-4.0), at(10.0)]);
+            let gouge = unseen_of(&part, &path, &cutters, 2.0, 0).0.gouge;
+            // As far as the surface itself is cut, 0.4 mm below the top; no farther than the tool comes.
+            let aside = beside + 0.4 / 89f64.to_radians().tan();
+            let cut = if beside > 0.0 { (9.0 - aside * aside).sqrt() - radius + over } else { 0.0 };
+            let [found, bound] = [gouge.max_depth_mm, gouge.error_bound_mm];
+            assert!(found + bound >= cut && found <= over + 1e-6, "{beside} {over} {cut} {gouge:?}");
+            assert!(bound < 3e-3, "{beside} {over} {gouge:?}");
+        }
+    }
 }

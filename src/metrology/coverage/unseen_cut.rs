@@ -4,7 +4,9 @@
 //! there. And a cut beside a convex edge belongs to the surface that is nearest to it: a pass that dips a
 //! nanometre into a level top cuts the uppermost line of the wall below as far as its arc is wide. On the
 //! medial axis, where the cut is as far from the top as from the wall, the top's own normal meets it as deep
-//! or deeper; so where cells measure that top, the wall has no share in it.
+//! or deeper; so where cells measure that top, the wall has no share in it. At the border of an open sheet the
+//! part ends as at a vertical wall: a tool that comes past the end of a face cuts it no deeper than that wall
+//! is near.
 
 use geometry::{Point3, Vector3};
 
@@ -12,7 +14,7 @@ use super::{STEEP, sees_level};
 use motion::{ClPoint, MoveKind, Toolpath};
 
 use crate::along_normals::{AlongNormal, NormalHit, SweptVolume, Way};
-use crate::beneath::ball_beneath;
+use crate::beneath::{ball_beneath, ball_beneath_at_most, ball_within_borders};
 use crate::facing::Facing;
 use crate::figures::NUMERICAL_FLOOR;
 
@@ -69,13 +71,15 @@ impl UnseenCut<'_> {
 
     /// A cut into the design as far as it belongs to this place.
     fn owned(&self, point: &Point3, normal: &Vector3, hit: NormalHit) -> Option<NormalHit> {
-        let fits = ball_beneath(self.cut.part, point, normal, -hit.deviation);
+        let fits = ball_within_borders(self.cut.part, point, normal, -hit.deviation);
         if fits >= -hit.deviation {
             return Some(hit);
         }
         let capped = self.cut.cut.first_cut(point, normal, [-fits, self.cut.outward], Some(&hit))?;
         if -capped.deviation < fits - NUMERICAL_FLOOR || !self.is_level_beyond(point, normal, fits) {
-            return Some(capped);
+            // Where all that belongs to the place is cut, the cut itself lies deeper.
+            let is_all = capped.deviation <= NUMERICAL_FLOOR - fits;
+            return Some(NormalHit { way: if is_all { Way::Thickness } else { capped.way }, ..capped });
         }
         // As deep as the top says, which is measured there.
         Some(NormalHit { deviation: 0.0, normal: *normal, way: Way::Normal, ..capped })
@@ -166,6 +170,8 @@ impl AlongNormal for UnseenCut<'_> {
     }
 
     fn depth_at_most(&self, point: &Point3, normal: &Vector3, aside: f64) -> f64 {
-        self.cut.depth_at_most(point, normal, aside)
+        let depth = self.cut.depth_at_most(point, normal, aside);
+        // A cut is no deeper than belongs to the place.
+        ball_beneath_at_most(self.cut.part, point, normal, aside, depth)
     }
 }
