@@ -1,0 +1,134 @@
+//! What a plan leaves above the design, as the loop sees it.
+
+use geometry::Point3;
+use metrology::{Bounded, RidgeMap, path_figures};
+use part::Part;
+use toolpath::Faces;
+
+use super::SLACK;
+use super::looking::Looked;
+use super::round::CorrectionRound;
+use crate::judge::highest_reached;
+use crate::planned::Planned;
+
+/// What a plan leaves above the design.
+pub(super) struct Standing {
+    /// As a round tells it, its length and factors aside.
+    pub(super) round: CorrectionRound,
+    /// Places near the target and above it with their heights, mm.
+    pub(super) above: Vec<(Point3, f64)>,
+    /// How deep it cuts below the design for certain, mm; 0 while only ridges are measured.
+    pub(super) depth: f64,
+    /// How high stands for certain what it does not reach, mm; 0 while only ridges are measured.
+    pub(super) unreached: f64,
+}
+
+impl Standing {
+    /// `None` without ridges: there is nothing to correct.
+    pub(super) fn of_ridges(
+        map: &RidgeMap,
+        planned: &Planned,
+        factors: [f64; 2],
+        wanted: Wanted<'_>,
+    ) -> Option<Self> {
+        let highest_ridge = map.scallop.max_mm?;
+        let round = CorrectionRound {
+            highest_mm: highest_ridge,
+            border_mm: Some(map.border),
+            error_bound_mm: map.scallop.error_bound_mm.filter(|_| highest_ridge >= map.border),
+            median_mm: map.scallop.p50_mm,
+            over_target_fraction: map.scallop.over_target_fraction,
+            cutting_length_mm: cutting_length(planned),
+            factors,
+            too_near_between_mm: too_near(planned),
+            measured: false,
+        };
+        let places = map.above.iter().map(|place| (place.at, place.height));
+        // The highest place stands between those that cells show.
+        let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
+        let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0, unreached: 0.0 };
+        Some(standing.served(&planned.plan.kept.faces, wanted))
+    }
+
+    /// Where cells see no ridge, of what stands along borders alone.
+    pub(super) fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2], wanted: Wanted<'_>) -> Self {
+        let measured = &looked.measured.measurement;
+        let scallop = &measured.scallop;
+        let (seen, reached) = (highest_reached(measured), measured.excess.reached);
+        let unseen = looked.unseen();
+        let of_unseen = unseen.map_or(Bounded::default(), |unseen| unseen.excess.highest);
+        let highest = scallop.max_mm.unwrap_or_default();
+        let on_border = reached.max_mm.max(of_unseen.max_mm) > highest;
+        let round = CorrectionRound {
+            highest_mm: highest,
+            border_mm: on_border.then_some(reached.max_mm.max(of_unseen.max_mm)),
+            error_bound_mm: Some(seen.or(&of_unseen).error_bound_mm),
+            median_mm: scallop.p50_mm,
+            over_target_fraction: scallop.over_target_fraction,
+            cutting_length_mm: cutting_length(planned),
+            factors,
+            too_near_between_mm: too_near(planned),
+            measured: true,
+        };
+        let places = measured.above.iter().chain(unseen.iter().flat_map(|unseen| &unseen.above));
+        let places = places.map(|place| (place.at, place.height));
+        let ridge = scallop.max_at_mm.map(|at| (at.into(), highest));
+        let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
+        let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
+        let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
+        let unreached = measured.excess.unreached.at_least_mm;
+        Self { round, above, depth, unreached }.served(&planned.plan.kept.faces, wanted)
+    }
+
+    /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once
+    /// those are cut. What stands high is left to a toolpath behind that is for the rest.
+    fn served(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
+        if *faces == Faces::ALL && wanted.highest == f64::INFINITY {
+            return self;
+        }
+        let mesh = wanted.part.mesh();
+        self.above.retain(|(at, height)| {
+            if *height > wanted.highest {
+                return false;
+            }
+            if *faces == Faces::ALL {
+                return true;
+            }
+            let foot = wanted.part.closest_point(at).0;
+            let around = mesh.triangles_at(foot.triangle as usize, &foot.point);
+            let mut held = around.into_iter().map(|t| faces.hold(&mesh.normal(t)));
+            if wanted.behind_others { held.any(|held| held) } else { held.all(|held| held) }
+        });
+        let highest = self.above.iter().map(|(_, height)| *height);
+        // What is not among the places stays below the target.
+        let highest = highest.fold((1.0 - SLACK) * wanted.target, f64::max);
+        let round = &mut self.round;
+        if round.highest() > highest {
+            round.error_bound_mm = None;
+        }
+        round.highest_mm = round.highest_mm.min(highest);
+        round.border_mm = round.border_mm.map(|border| border.min(highest));
+        self
+    }
+}
+
+/// What a plan is to leave, and on what.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    pub(super) part: &'a Part,
+    /// What no ridge may exceed, mm.
+    pub(super) target: f64,
+    /// What stands higher is a matter of another toolpath, mm.
+    pub(super) highest: f64,
+    /// Whether what others left is all that is cut.
+    pub(super) behind_others: bool,
+}
+/// [`CorrectionRound::cutting_length_mm`] of a plan.
+pub(super) fn cutting_length(planned: &Planned) -> f64 {
+    path_figures(&planned.plan.path, 0.0).cutting_length_mm
+}
+
+/// [`CorrectionRound::too_near_between_mm`] of a plan.
+pub(super) fn too_near(planned: &Planned) -> Option<f64> {
+    Some(planned.plan.too_near_between).filter(|missing| *missing > 0.0)
+}
