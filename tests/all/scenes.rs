@@ -197,13 +197,38 @@ fn streamlines_on_a_stepped_mesh_are_good() {
 }
 
 #[test]
-#[ignore = "minutes: five parts, cut by two to five toolpaths each"]
+#[ignore = "minutes: six parts, cut by two to five toolpaths each"]
 fn the_other_parts_are_good() {
-    for name in ["pit_and_crest.toml", "ridge.toml", "relief.toml", "stepped.toml", "joined.toml"] {
+    for name in [
+        "pit_and_crest.toml",
+        "ridge.toml",
+        "relief.toml",
+        "stepped.toml",
+        "joined.toml",
+        "rough_finish_rest.toml",
+    ] {
         let (status, report) = run(name);
         assert_eq!(status, 0, "{name}");
         assert_good(name, &report);
     }
+}
+
+/// A hollow of three tools: what they leave together passes, the second alone leaves ten times the target, and
+/// the third goes no farther than it has to.
+#[test]
+fn three_tools_rough_finish_and_cut_the_rest() {
+    let part = [
+        ["x = [0, 40]", "x = [2, 18]"],
+        ["y = [0, 40]", "y = [1, 12]"],
+        ["[stock]", "[tolerance]\nscallop = 0.02\n[stock]"],
+    ];
+    let (status, report) = run_with("rough_finish_rest.toml", &part, |_| true);
+    assert_eq!(status, 0, "{report}");
+    let [rough, finish, rest] = [0, 1, 2].map(|k| &report["toolpaths"][k]);
+    assert!((number(rough, "/deviation/min_mm") - 0.3).abs() < 0.002, "{}", rough["deviation"]);
+    assert!(number(finish, "/excess/max_mm") > 0.1, "{}", finish["excess"]);
+    assert!(number(rest, "/excess/max_mm") <= 0.02, "{}", rest["excess"]);
+    assert!(length(&report, 2) < 0.5 * length(&report, 1), "{} {}", length(&report, 1), length(&report, 2));
 }
 
 /// Passes that leave the part over its border and come back: no move leads from one side to the other.
@@ -332,8 +357,7 @@ fn a_pocket_with_islands_is_cleared_by_smooth_flow_as_well() {
     flow_is_smoother_than_offsets(&run("bracket.toml"));
 }
 
-/// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or
-/// little of one. Passes from vectors, along walls and from guides clear a pocket with an island, and keep to
+/// Passes from vectors, along walls and from guides clear a pocket with an island, and keep to
 /// what was asked for where nothing turns around a point.
 #[test]
 fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
@@ -357,6 +381,8 @@ fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
     assert!(named("parallel").get("field").is_none());
 }
 
+/// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or
+/// little of one.
 #[test]
 fn open_pockets_and_corners_left_by_a_larger_cutter_are_cleared() {
     for (scene, limit) in [("open_step", 70.0), ("rest_corners", 60.0)] {
