@@ -243,7 +243,7 @@ impl Session {
     /// The figures of ridges; none is held against the target where another toolpath cuts them off.
     fn scallop_figures(&self, request: &ToolpathRequest, measurement: &Measurement) -> ScallopFigures {
         let scallop = measurement.scallop.clone();
-        match self.leaves_the_rest(request) {
+        match self.goes_on(request) {
             true => ScallopFigures {
                 target_mm: self.scene.tolerance.scallop,
                 over_target_fraction: None,

@@ -15,7 +15,7 @@ use io::regular;
 use keys::{Located, SceneError, SceneText, Section, printable};
 use machine::{Blending, Machine};
 use metrology::{Limits, ScallopRule};
-use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
+use toolpath::{Joining, Links, PartKind, Step, Strategy, read_pocket_step, read_strategy, words_for};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
@@ -442,7 +442,8 @@ fn read_toolpath(
     let correct = if surface { section.flag("correct")?.unwrap_or(correct) } else { false };
     let boundary = if surface { read_boundary(section, axis.is_some())? } else { None };
     let rest = surface && read_rest(section, axis.is_some())?;
-    let [stepdown, allowance] = if surface { read_roughing(section, axis.is_some())? } else { [None; 2] };
+    let [stepdown, allowance] =
+        if surface { read_roughing(section, axis.is_some(), &*read.strategy)? } else { [None; 2] };
     Ok(ToolpathRequest {
         name,
         folder: own_folder,
@@ -529,17 +530,28 @@ fn beside_axis(section: &Section<'_>, key: &str) -> SceneError {
 }
 
 /// How deep each level of a toolpath goes below the one above, and what it leaves on the part, mm.
-fn read_roughing(section: &Section<'_>, tilts: bool) -> Result<[Option<f64>; 2], SceneError> {
+fn read_roughing(
+    section: &Section<'_>,
+    tilts: bool,
+    strategy: &dyn Strategy,
+) -> Result<[Option<f64>; 2], SceneError> {
     let mut found = [None; 2];
     for (value, key) in found.iter_mut().zip([STEPDOWN, ALLOWANCE]) {
-        *value = section.length(key)?.map(|v| v.value);
+        let least = if key == ALLOWANCE { 0.0 } else { *keys::LENGTH.start() };
+        *value = section.number(key, least..=*keys::LENGTH.end(), " mm")?.map(|v| v.value);
         if value.is_some() && tilts {
             return Err(beside_axis(section, key));
         }
     }
-    let [_, allowance] = found;
+    let [stepdown, allowance] = found;
+    if stepdown.is_some() && !strategy.is_spaced_in_plan() {
+        let message =
+            format!("`{STEPDOWN}` does not apply to strategy = \"{}\" as it is here", strategy.word());
+        let cure = "rough by `zigzag` or a plain `spiral`: between other passes, held up at a level, stock may stand";
+        return Err(section.error(&section.key_span(STEPDOWN), message, cure));
+    }
     // Ridges over what is left on the part are none of the part's.
-    if allowance.is_some() && !section.has("stepover") {
+    if allowance.is_some_and(|allowance| allowance > 0.0) && !section.has("stepover") {
         let message =
             format!("a toolpath with an `{ALLOWANCE}` is planned by a `stepover`, and none is given");
         let cure = "add `stepover`: no scallop height is judged of what another toolpath cuts off";

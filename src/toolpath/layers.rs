@@ -32,33 +32,52 @@ const STRAIGHT: f64 = 1e-9;
 /// Most levels: more are a mistake of the unit.
 pub(crate) const MOST_LEVELS: f64 = 1e4;
 
-/// How many levels lead from the top of the stock to the lowest tip, none more than `stepdown` below the one
-/// above, mm.
-pub(crate) fn count(passes: &[Vec<Point3>], top: f64, stepdown: f64) -> f64 {
-    let lowest = passes.iter().flatten().map(|tip| tip.z).fold(top, f64::min);
-    ((top - lowest) / stepdown).ceil().max(1.0)
+/// Heights at which passes are held up, evenly apart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Levels {
+    top: f64,
+    lowest: f64,
+    count: f64,
 }
 
-/// The layers of passes, from the top of the stock down, by levels evenly apart.
-///
-/// # Errors
-/// When cancelled.
-pub(crate) fn layers(
-    passes: &[Vec<Point3>],
-    top: f64,
-    stepdown: f64,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Layer>, Cancelled> {
-    let lowest = passes.iter().flatten().map(|tip| tip.z).fold(top, f64::min);
-    let levels = count(passes, top, stepdown) as usize;
-    let level = |k: usize| if k == levels { lowest } else { top + (lowest - top) * k as f64 / levels as f64 };
-    let layer = |k: usize| {
-        monitor::check(monitor)?;
-        let (floor, ceiling) = (level(k + 1), level(k));
-        let passes = passes.iter().flat_map(|pass| stretches(pass, floor, ceiling)).collect();
-        Ok(Layer { floor, passes })
-    };
-    (0..levels).map(layer).collect()
+impl Levels {
+    /// From the top of the stock to the lowest place at which a pass meets it, none more than `stepdown` below
+    /// the one above, mm; `meets` tells how high a tip cuts stock at the lowest, `None` where it is in the air:
+    /// beside the stock a tool may dip far.
+    pub fn new(
+        passes: &[Vec<Point3>],
+        top: f64,
+        stepdown: f64,
+        meets: impl Fn(&Point3) -> Option<f64>,
+    ) -> Self {
+        let lowest = passes.iter().flatten().filter_map(meets).fold(top, f64::min);
+        Self { top, lowest, count: ((top - lowest) / stepdown).ceil().max(1.0) }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> f64 {
+        self.count
+    }
+
+    /// The layers of passes, from the top of the stock down; the last one leaves what the passes do.
+    ///
+    /// # Errors
+    /// When cancelled.
+    pub fn layers(&self, passes: &[Vec<Point3>], monitor: &dyn Monitor) -> Result<Vec<Layer>, Cancelled> {
+        let count = self.count as usize;
+        let level = |k: usize| match k {
+            0 => f64::INFINITY,
+            _ if k == count => f64::NEG_INFINITY,
+            _ => self.top + (self.lowest - self.top) * k as f64 / self.count,
+        };
+        let layer = |k: usize| {
+            monitor::check(monitor)?;
+            let (floor, ceiling) = (level(k + 1), level(k));
+            let passes = passes.iter().flat_map(|pass| stretches(pass, floor, ceiling)).collect();
+            Ok(Layer { floor, passes })
+        };
+        (0..count).map(layer).collect()
+    }
 }
 
 /// The stretches of a pass below the `ceiling`, none of their tips below the `floor`.
@@ -109,9 +128,10 @@ mod tests {
     fn passes_over_a_ridge_are_held_up_and_cut_off() {
         let tip = Point3::new;
         let pass = vec![tip(0.0, 0.0, 0.0), tip(10.0, 0.0, 9.0), tip(20.0, 0.0, 0.0)];
-        let found = layers(&[pass], 12.0, 5.0, &Silent).unwrap();
+        let passes = [pass];
+        let found = Levels::new(&passes, 12.0, 5.0, |tip| Some(tip.z)).layers(&passes, &Silent).unwrap();
         let floors: Vec<f64> = found.iter().map(|layer| layer.floor).collect();
-        assert_eq!(floors, [8.0, 4.0, 0.0]);
+        assert_eq!(floors, [8.0, 4.0, f64::NEG_INFINITY]);
         // Above the level: on the ridge itself.
         let near = |a: &[Point3], b: &[[f64; 2]]| {
             assert_eq!(a.len(), b.len(), "{a:?}");
@@ -127,10 +147,22 @@ mod tests {
         near(&third[1], &[[20.0 - foot(4.0), 4.0], [20.0, 0.0]]);
     }
 
+    /// Beyond the stock, at x = 5, the tool dips to -4: levels do not lead there.
+    #[test]
+    fn levels_end_where_stock_is_met() {
+        let passes =
+            [vec![Point3::new(0.0, 0.0, -2.0), Point3::new(5.0, 0.0, -2.0), Point3::new(6.0, 0.0, -4.0)]];
+        let levels = Levels::new(&passes, 0.0, 1.0, |tip| (tip.x <= 5.0).then_some(tip.z));
+        let heights = |layer: &Layer| layer.passes[0].iter().map(|tip| tip.z).fold(0.0, f64::min);
+        let lowest: Vec<f64> = levels.layers(&passes, &Silent).unwrap().iter().map(heights).collect();
+        assert_eq!(lowest, [-1.0, -4.0]);
+    }
+
     #[test]
     fn a_level_pass_is_repeated_on_every_level() {
         let pass = vec![Point3::new(0.0, 0.0, -3.0), Point3::new(9.0, 0.0, -3.0)];
-        let found = layers(&[pass], 0.0, 1.0, &Silent).unwrap();
+        let passes = [pass];
+        let found = Levels::new(&passes, 0.0, 1.0, |tip| Some(tip.z)).layers(&passes, &Silent).unwrap();
         let heights: Vec<f64> = found.iter().map(|layer| layer.passes[0][0].z).collect();
         assert_eq!(heights, [-1.0, -2.0, -3.0]);
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::facets::facet_charge;
 use crate::keep::{check_faces, keep_asked};
-use crate::layers::{self, Layer};
+use crate::layers::{Layer, Levels, MOST_LEVELS};
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::lowering::lowered;
@@ -55,9 +55,11 @@ impl Plan {
 
     fn again(path: Toolpath, kept: Arc<Kept>, further: Vec<String>) -> Self {
         let mut notes = kept.notes.clone();
+        let further_says = !further.is_empty();
         notes.extend(further);
         if path.is_empty() {
-            notes.push("no pass reaches the part: the program is empty".into());
+            let why = if further_says { "" } else { "no pass reaches the part: " };
+            notes.push(format!("{why}the program is empty"));
         }
         Self { path, notes, field: kept.field.clone(), kept, too_near_between: 0.0 }
     }
@@ -166,25 +168,29 @@ fn plan_on(
         let added = touch_up::passes(task, &kept.passes)?;
         Ok((kept, added))
     })?;
-    let further = touch_up::note(&added);
+    let rest_is_empty = settings.places.rest.as_ref().is_some_and(|rest| rest.is_empty());
+    let empty = rest_is_empty.then(|| "the toolpaths before left nothing above the scallop tolerance".into());
+    let further = touch_up::note(&added).into_iter().chain(empty).collect();
     let all = kept.passes.iter().cloned().chain(added).collect();
     let all = deeper(all, cutter, settings);
-    let path = join(by_levels(all, settings, monitor)?, strategy.both_ways(), &setup)?;
-    Ok(Plan::again(path, kept, further.into_iter().collect()))
+    let path = join(by_levels(all, &setup)?, strategy.both_ways(), &setup)?;
+    Ok(Plan::again(path, kept, further))
 }
 
 /// Passes as they are cut one layer after the other.
-fn by_levels(
-    passes: Vec<Vec<Point3>>,
-    settings: &PlanSettings,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Layer>, PlanError> {
+fn by_levels(passes: Vec<Vec<Point3>>, setup: &Setup<'_>) -> Result<Vec<Layer>, PlanError> {
+    let Setup { part, cutter, settings, monitor } = *setup;
     let Some(stepdown) = settings.stepdown else { return Ok(vec![Layer::whole(passes)]) };
-    let levels = layers::count(&passes, settings.stock_top, stepdown);
-    if levels > layers::MOST_LEVELS {
-        return Err(PlanError::TooManyLevels { stepdown, levels });
+    let stock = settings.stock.unwrap_or_else(|| part.bounds());
+    let meets = |tip: &Point3| {
+        let nearest = tip.xy().sup(&stock.min.xy()).inf(&stock.max.xy());
+        cutter.height((tip.xy() - nearest).norm()).map(|rise| tip.z + rise)
+    };
+    let levels = Levels::new(&passes, settings.stock_top, stepdown, meets);
+    if levels.count() > MOST_LEVELS {
+        return Err(PlanError::TooManyLevels { stepdown, levels: levels.count() });
     }
-    Ok(layers::layers(&passes, settings.stock_top, stepdown, monitor)?)
+    Ok(levels.layers(&passes, monitor)?)
 }
 
 /// Passes of an upright cutter, deeper beside places where an earlier plan left a little too much.

@@ -203,6 +203,8 @@ fn roughing_that_cannot_be_meant_is_refused() {
     refused(&format!("{PLATE}{by_height}{FINISH}{PREVIOUS}"), "is planned by a `stepover`");
     refused(&format!("{PLATE}{ROUGH}stepdown = 1\naxis = {{ lead = 10 }}\n"), "does not apply beside `axis`");
     refused(&format!("{PLATE}{ROUGH}stepdown = 1e-6\n"), "set a greater one");
+    let contours = ROUGH.replace("zigzag", "iso-scallop");
+    refused(&format!("{PLATE}{contours}stepdown = 1\n"), "rough by `zigzag`");
     let holder = "holder = { cutting_length = 9, section = [{ diameter = 9, length = 30 }] }\n";
     refused(&format!("{PLATE}{ROUGH}{holder}"), "`holder` in a toolpath without `cutter`");
     let cutter = "cutter = { shape = \"flat\", diameter = 8 }\n";

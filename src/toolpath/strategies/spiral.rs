@@ -76,6 +76,10 @@ impl Strategy for Spiral {
             Self::Contour => contour_spiral::passes(task),
         }
     }
+
+    fn is_spaced_in_plan(&self) -> bool {
+        *self == Self::Plan
+    }
 }
 
 /// Plans the spiral.

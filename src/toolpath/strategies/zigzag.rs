@@ -127,6 +127,10 @@ impl Strategy for Zigzag {
     fn both_ways(&self) -> bool {
         !self.one_way
     }
+
+    fn is_spaced_in_plan(&self) -> bool {
+        true
+    }
 }
 
 /// Plans passes in the direction `angle` (rad from x).

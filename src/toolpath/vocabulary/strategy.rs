@@ -120,6 +120,13 @@ pub trait Strategy: Any + Debug + Send + Sync + BoxedClone {
         false
     }
 
+    /// Whether its passes are spaced by the axis of the cutter, so that they leave nothing between them where
+    /// they are held up at a level. Others lie so that contacts are near each other: on a crest the axes of
+    /// two of them may stand farther apart than the cutter is wide.
+    fn is_spaced_in_plan(&self) -> bool {
+        false
+    }
+
     /// How its passes are joined where nothing is said of it.
     fn usual_links(&self) -> Links {
         Links::Retract
