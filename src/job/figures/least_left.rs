@@ -244,7 +244,7 @@ mod tests {
         let file = std::env::temp_dir().join(format!("crease_{}.stl", std::process::id()));
         std::fs::write(&file, format!("solid crease\n{facets}endsolid crease\n")).unwrap();
         let text = format!(
-            "[part]\nfile = {:?}\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.02\nuncut = 0.1\n\
+            "[part]\nfile = {:?}\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.02\nuncut = 0.02\n\
              [[toolpath]]\nstrategy = \"zigzag\"\nangle = 90\n",
             file.to_str().unwrap()
         );
@@ -259,7 +259,10 @@ mod tests {
         let left = value("least_left");
         let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| left[key].as_f64().unwrap());
         assert!(height > 0.02 && height - bound <= stands + 1e-6, "{height} ± {bound} {stands}");
-        assert_eq!(value("correction")["rounds"].as_array().unwrap().len(), 1);
+        let correction = value("correction");
+        let rounds = correction["rounds"].as_array().unwrap();
+        let is_narrowed = |round: &serde_json::Value| round["factors"][0].as_f64().unwrap() < 1.0;
+        assert!(rounds.len() <= 3 && !rounds.iter().any(is_narrowed), "{rounds:?}");
     }
 
     /// Between the places of the raster, too, and beside places that stand higher for other reasons.
