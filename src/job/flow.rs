@@ -165,12 +165,11 @@ impl Session {
         if let Some(unseen) = &mut covered.unseen {
             unseen.measurement.widen(strays);
         }
-        gouge_moves::name(
-            &mut measured.measurement.gouge.regions,
-            &whole,
-            earlier,
-            OwnMoves { path, cutters: &cutters },
-        );
+        let unseen = covered.unseen.iter_mut().map(|unseen| &mut unseen.measurement);
+        for found in unseen.chain([&mut measured.measurement]) {
+            let own = OwnMoves { path, cutters: &cutters };
+            gouge_moves::name(&mut found.gouge.regions, &whole, earlier, own);
+        }
         let run = Run {
             session: self,
             request,

@@ -15,6 +15,7 @@
 
 use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
+use sim::NOT_CUT;
 
 /// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are
 /// of `program`.
@@ -70,7 +71,10 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
         micrometres(Some(limits.gouge))
     );
     if let Some(worst) = figures.regions.first() {
-        text += &format!(" at {}, move {}", place(worst.at_mm), worst.move_index);
+        text += &format!(" at {}", place(worst.at_mm));
+        if worst.move_index != NOT_CUT {
+            text += &format!(", move {}", worst.move_index);
+        }
         // Paths that tilt the tool have no program where the scene names no machine for it.
         text += &match &worst.toolpath {
             Some(name) => format!(" of the toolpath {name} before this one, line {}", worst.line),

@@ -212,6 +212,11 @@ fn a_gouge_names_move_and_line() {
     let text = judged(&measurement(0.032), &STRICT).1[0].text.clone();
     assert!(text.contains("gouge 32.0 ± 0.50 µm deep (limit 5.00)"), "{text}");
     assert!(text.contains("at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240"), "{text}");
+    let mut measured = measurement(0.032);
+    measured.gouge.regions[0] =
+        GougeRegion { move_index: NOT_CUT, line: 0, ..measured.gouge.regions[0].clone() };
+    let text = judged(&measured, &STRICT).1[0].text.clone();
+    assert!(text.ends_with("at x 12.500 y 7.250 z -1.032"), "{text}");
 }
 
 #[test]
