@@ -27,11 +27,13 @@ pub(crate) fn judge(
     program: &str,
 ) -> Vec<Claim> {
     let mut claims = found;
-    claims.extend([
-        gouge(measured, limits, program),
-        uncut(measured, limits),
-        highest(measured, limits, rule),
-    ]);
+    let (uncut, highest) = (uncut(measured, limits), highest(measured, limits, rule));
+    // A scallop that is too high is one violation, not two.
+    let both = [&uncut, &highest].iter().all(|claim| claim.verdict() == Verdict::Fail);
+    let is_scallop = both && is_below_scallop(measured);
+    claims.push(gouge(measured, limits, program));
+    claims.extend(Some(uncut).filter(|_| !is_scallop));
+    claims.push(highest);
     claims.extend(most(measured, limits, rule));
     claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
     claims
@@ -113,6 +115,15 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     }
     text += &for_certain(&all, limits.uncut);
     Claim { measured: known(measured, height), ..claim("uncut", limits.uncut, &all) }.told(text)
+}
+
+/// Whether the highest uncut material is no more than a flank of the highest scallop: it has no place and no
+/// area of its own, and stands no higher.
+fn is_below_scallop(measured: &Measurement) -> bool {
+    let Measurement { uncut, excess, scallop, .. } = measured;
+    let height = uncut.max_height_mm.max(excess.unreached.max_mm);
+    let has_place = !uncut.regions.is_empty() || excess.unreached.at_mm.is_some();
+    height > 0.0 && !has_place && scallop.max_mm.is_some_and(|ridge| height <= ridge)
 }
 
 /// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a

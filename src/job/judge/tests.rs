@@ -146,6 +146,21 @@ fn a_remnant_beside_a_border_answers_to_the_scallop_limit() {
     assert_eq!(not_held(&measured, &STRICT), [("uncut", Verdict::Fail)]);
 }
 
+/// A scallop above both limits is one violation, unless uncut material has a place of its own or stands higher.
+#[test]
+fn a_flank_of_a_scallop_is_no_violation_of_its_own() {
+    let mut measured = measurement(0.0);
+    measured.scallop.max_mm = Some(0.2);
+    measured.uncut.max_height_mm = 0.199;
+    measured.excess.unreached = Bounded::new(0.199, 1e-6);
+    assert_eq!(not_held(&measured, &STRICT), [("scallop", Verdict::Fail)]);
+    measured.excess.unreached.at_mm = Some([1.0, 2.0, 3.0]);
+    let both = [("uncut", Verdict::Fail), ("scallop", Verdict::Fail)];
+    assert_eq!(not_held(&measured, &STRICT), both);
+    measured.excess.unreached = Bounded::new(0.201, 1e-6);
+    assert_eq!(not_held(&measured, &STRICT), both);
+}
+
 /// A place that no move cuts away decides by itself, however much more may stand elsewhere; cells alone do
 /// not.
 #[test]
