@@ -6,7 +6,7 @@
 //! that the tool slides along is no nearer for that, since it moves along the plane. Stretches that this does
 //! not settle are halved.
 
-use super::piece::{Convex, ToolPiece, middle};
+use super::piece::{Convex, Sample, ToolPiece, middle};
 use super::{Clearance, Obstacle};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
@@ -207,6 +207,17 @@ impl<P: Convex> Stretch<P> {
         }
         if falls <= most.max(0.1 * RESOLUTION) {
             return true;
+        }
+        // What supports the distance at the nearest place rises toward all corners.
+        if let Some(near) = self.piece.nearest_on(corners, f64::INFINITY) {
+            let Sample { distance, gradient } = self.piece.sample(&near.point);
+            let left = |c: &Point3| gradient.dot(&(c - near.point)) - self.moved(&gradient, c, 0.0);
+            if distance + corners.iter().map(left).fold(f64::INFINITY, f64::min) >= limit {
+                return false;
+            }
+            if distance < limit {
+                return true;
+            }
         }
         let side = |k: usize| (corners[(k + 1) % 3] - corners[k]).norm_squared();
         let longest = (0..3).max_by(|&a, &b| side(a).total_cmp(&side(b))).unwrap_or(0);

@@ -45,17 +45,19 @@ impl Session {
     /// What the measurement of a pocket covers: its floor by cells, its walls by the moves.
     pub(crate) fn pocket_covered(&self, pocket: &Pocket, cutters: &Cutters) -> Covered {
         let cutter = cutters.first();
+        let radius = cutter.radius();
         // Round corners leave a fillet at the foot.
         let upright = (pocket.depth - cutter.corner_radius()).max(0.0);
-        let walls =
-            [upright * pocket.reached_wall_length(cutter.radius()), pocket.depth * pocket.wall_length()];
+        let walls = [upright * pocket.reached_wall_length(radius), pocket.depth * pocket.wall_length()];
+        let bound = pocket.depth * pocket.reached_wall_length_bound(radius) + pocket.floor_area_bound(radius);
         let mesh = self.part.mesh();
         let floor = |t: usize| {
             let [a, b, c] = mesh.corners(t);
             0.5 * (b - a).cross(&(c - a)).norm()
         };
         let floor = (0..mesh.triangles().len()).map(floor).sum();
-        let areas = CoverageFigures::of_pocket(self.scene.judged, [floor, pocket.region.area()], walls);
+        let areas =
+            CoverageFigures::of_pocket(self.scene.judged, [floor, pocket.region.area()], walls, bound);
         Covered { areas, unseen: None }
     }
 

@@ -165,12 +165,11 @@ impl Session {
         if let Some(unseen) = &mut covered.unseen {
             unseen.measurement.widen(strays);
         }
-        gouge_moves::name(
-            &mut measured.measurement.gouge.regions,
-            &whole,
-            earlier,
-            OwnMoves { path, cutters: &cutters },
-        );
+        let unseen = covered.unseen.iter_mut().map(|unseen| &mut unseen.measurement);
+        for found in unseen.chain([&mut measured.measurement]) {
+            let own = OwnMoves { path, cutters: &cutters };
+            gouge_moves::name(&mut found.gouge.regions, &whole, earlier, own);
+        }
         let run = Run {
             session: self,
             request,
@@ -197,7 +196,7 @@ impl Session {
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
             path: planned.path_figures(&self.scene, monitor)?,
-            scallop: self.scallop_figures(request, measurement),
+            scallop: self.scallop_figures(request, measurement, unseen),
             gouge: unseen
                 .map_or_else(|| measurement.gouge.clone(), |unseen| measurement.gouge.or(&unseen.gouge)),
             uncut: measurement.uncut.clone(),
@@ -240,9 +239,16 @@ impl Session {
         }
     }
 
-    /// The figures of ridges; none is held against the target where another toolpath cuts them off.
-    fn scallop_figures(&self, request: &ToolpathRequest, measurement: &Measurement) -> ScallopFigures {
-        let scallop = measurement.scallop.clone();
+    /// The figures of ridges, also where no cell sees; none is held against the target where another toolpath
+    /// cuts them off.
+    fn scallop_figures(
+        &self,
+        request: &ToolpathRequest,
+        measurement: &Measurement,
+        unseen: Option<&Measurement>,
+    ) -> ScallopFigures {
+        let all = |unseen| measurement.scallops_with(unseen, &self.scene.tolerance);
+        let scallop = unseen.map_or_else(|| measurement.scallop.clone(), all);
         match self.goes_on(request) {
             true => ScallopFigures {
                 target_mm: self.scene.tolerance.scallop,

@@ -15,6 +15,7 @@
 
 use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
+use sim::NOT_CUT;
 
 /// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are
 /// of `program`.
@@ -26,11 +27,13 @@ pub(crate) fn judge(
     program: &str,
 ) -> Vec<Claim> {
     let mut claims = found;
-    claims.extend([
-        gouge(measured, limits, program),
-        uncut(measured, limits),
-        highest(measured, limits, rule),
-    ]);
+    let (uncut, highest) = (uncut(measured, limits), highest(measured, limits, rule));
+    // A scallop that is too high is one violation, not two.
+    let both = [&uncut, &highest].iter().all(|claim| claim.verdict() == Verdict::Fail);
+    let is_scallop = both && is_below_scallop(measured);
+    claims.push(gouge(measured, limits, program));
+    claims.extend(Some(uncut).filter(|_| !is_scallop));
+    claims.push(highest);
     claims.extend(most(measured, limits, rule));
     claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
     claims
@@ -70,7 +73,10 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
         micrometres(Some(limits.gouge))
     );
     if let Some(worst) = figures.regions.first() {
-        text += &format!(" at {}, move {}", place(worst.at_mm), worst.move_index);
+        text += &format!(" at {}", place(worst.at_mm));
+        if worst.move_index != NOT_CUT {
+            text += &format!(", move {}", worst.move_index);
+        }
         // Paths that tilt the tool have no program where the scene names no machine for it.
         text += &match &worst.toolpath {
             Some(name) => format!(" of the toolpath {name} before this one, line {}", worst.line),
@@ -109,6 +115,15 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     }
     text += &for_certain(&all, limits.uncut);
     Claim { measured: known(measured, height), ..claim("uncut", limits.uncut, &all) }.told(text)
+}
+
+/// Whether the highest uncut material is no more than a flank of the highest scallop: it has no place and no
+/// area of its own, and stands no higher.
+fn is_below_scallop(measured: &Measurement) -> bool {
+    let Measurement { uncut, excess, scallop, .. } = measured;
+    let height = uncut.max_height_mm.max(excess.unreached.max_mm);
+    let has_place = !uncut.regions.is_empty() || excess.unreached.at_mm.is_some();
+    height > 0.0 && !has_place && scallop.max_mm.is_some_and(|ridge| height <= ridge)
 }
 
 /// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a

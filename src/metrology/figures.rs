@@ -120,8 +120,8 @@ pub struct GougeRegion {
     pub area_mm2: f64,
     /// Where the greatest depth is.
     pub at_mm: [f64; 3],
-    /// The move that cut there, counted from 0.
-    #[serde(rename = "move")]
+    /// The move that cut there, counted from 0; [`sim::NOT_CUT`], and not written, where it is not known.
+    #[serde(rename = "move", skip_serializing_if = "is_not_cut")]
     pub move_index: u32,
     /// Its line in toolpath.nc, counted from 1; 0 where there is no such program.
     pub line: u32,
@@ -246,6 +246,11 @@ impl Bounded {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_not_cut(move_index: &u32) -> bool {
+    *move_index == sim::NOT_CUT
 }
 
 /// What the highest material is.

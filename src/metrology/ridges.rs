@@ -15,7 +15,7 @@
 
 use super::cut_surface::CutSurface;
 use super::every_move::EveryMove;
-use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
+use super::figures::{Limits, Measurement, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::inspection::Inspection;
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
@@ -426,6 +426,28 @@ impl RidgeFinder<'_> {
             let contact = tip - from_contact;
             (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
         })
+    }
+}
+
+impl Measurement {
+    /// The figures of the ridges of this surface and of another one together, which was measured by itself.
+    pub fn scallops_with(&self, other: &Self, limits: &Limits) -> ScallopFigures {
+        let highest = |of: &Self| {
+            let ScallopFigures { max_mm, max_at_mm, error_bound_mm, .. } = of.scallop;
+            let height = max_mm?;
+            let possible = height + error_bound_mm? - NUMERICAL_FLOOR;
+            Some(Highest { height, at: max_at_mm?.into(), possible })
+        };
+        let both = match [self, other].map(highest) {
+            [Some(a), Some(b)] => {
+                let higher = if b.height > a.height { b } else { a };
+                Highest { possible: a.possible.max(b.possible), ..higher }
+            }
+            [None, Some(_)] => return other.scallop.clone(),
+            [_, None] => return self.scallop.clone(),
+        };
+        let ridges = [&self.ridge_samples[..], &other.ridge_samples].concat();
+        scallop_figures(&ridges, Some(both), limits)
     }
 }
 

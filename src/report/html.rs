@@ -345,7 +345,7 @@ fn regions(t: &ToolpathResult) -> Markup {
             table.figures {
                 thead { tr { th { "ring" } th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of the program" } } }
                 tbody { @for (k, r) in (1..).zip(&t.gouge.regions) {
-                    tr { th { "G" (k) } td { (micrometres(Some(r.depth_mm))) } td { @if r.area_mm2 > 0.0 { (format!("{:.4}", r.area_mm2)) } @else { "–" } } td { (place(r.at_mm)) } td { (r.move_index) } td { @if r.line > 0 { (r.line) } @if let Some(tool) = r.tool { ", tool " (tool) } @if let Some(name) = &r.toolpath { ", " (name) } } }
+                    tr { th { "G" (k) } td { (micrometres(Some(r.depth_mm))) } td { @if r.area_mm2 > 0.0 { (format!("{:.4}", r.area_mm2)) } @else { "–" } } td { (place(r.at_mm)) } td { @if r.move_index == sim::NOT_CUT { "–" } @else { (r.move_index) } } td { @if r.line > 0 { (r.line) } @if let Some(tool) = r.tool { ", tool " (tool) } @if let Some(name) = &r.toolpath { ", " (name) } } }
                 } }
             }
         }

@@ -145,6 +145,14 @@ pub enum ToolpathReport {
 }
 
 impl ToolpathReport {
+    /// What the user calls it.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Measured(result) => &result.name,
+            Self::NotPlanned(missing) => &missing.name,
+        }
+    }
+
     /// Its verdict.
     pub fn verdict(&self) -> Verdict {
         match self {

@@ -1,13 +1,13 @@
 //! The result in words and one table, 100 columns wide, for terminals and logs.
 
+use std::collections::HashSet;
 use std::fmt::Write as _;
 
-use super::canvas::shortened;
 use super::result::{NotPlanned, RunReport, ToolpathReport, ToolpathResult, time_of};
 use super::scale::plain;
 use super::verdict::Verdict;
 
-/// Letters of a toolpath's name in the table; longer ones are cut.
+/// Letters of a toolpath's name in the table; of longer ones the middle is left out.
 const NAME_WIDTH: usize = 16;
 
 /// A time as people read it: `1:02:03` or `2:03` or `12.3 s`.
@@ -57,21 +57,44 @@ pub fn per_cent(share: Option<f64>) -> String {
     share.map_or("-".to_owned(), |share| plain(100.0 * share, 0.1))
 }
 
-fn row(out: &mut String, cells: [&str; 11]) -> std::fmt::Result {
+/// `text` with no more letters than that; an ellipsis stands for its middle.
+fn without_middle(text: &str, letters: usize) -> String {
+    let all = text.chars().count();
+    if all <= letters {
+        return text.to_owned();
+    }
+    let behind = letters / 2;
+    let before = text.chars().take(letters - 1 - behind);
+    before.chain(['…']).chain(text.chars().skip(all - behind)).collect()
+}
+
+/// Letters that names need so that no two read alike: [`NAME_WIDTH`], or as many as the longest has.
+fn name_width(report: &RunReport) -> usize {
+    let names: Vec<&str> = report.toolpaths.iter().map(ToolpathReport::name).collect();
+    let shown: HashSet<String> = names.iter().map(|name| without_middle(name, NAME_WIDTH)).collect();
+    if shown.len() == names.iter().collect::<HashSet<_>>().len() {
+        return NAME_WIDTH;
+    }
+    names.iter().map(|name| name.chars().count()).fold(NAME_WIDTH, usize::max)
+}
+
+fn row(out: &mut String, width: usize, cells: [&str; 11]) -> std::fmt::Result {
     let [name, passes, length, time, max, p95, p50, over, uncut, gouge, verdict] = cells;
+    let name = without_middle(name, width);
     let line = format!(
-        "{name:<NAME_WIDTH$} {passes:>6} {length:>7} {time:>7} {max:>12} {p95:>5} {p50:>5} {over:>5} {uncut:>6} {gouge:>11}  {verdict}"
+        "{name:<width$} {passes:>6} {length:>7} {time:>7} {max:>12} {p95:>5} {p50:>5} {over:>5} {uncut:>6} {gouge:>11}  {verdict}"
     );
     writeln!(out, "{}", line.trim_end())
 }
 
-fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
+fn toolpath_row(out: &mut String, width: usize, t: &ToolpathResult) -> std::fmt::Result {
     let scallop = &t.scallop;
     let [depth, bound] = t.deepest_cut();
     row(
         out,
+        width,
         [
-            &shortened(&t.name, NAME_WIDTH),
+            &t.name,
             &t.path.passes.to_string(),
             &format!("{:.0}", t.path.cutting_length_mm),
             &duration(t.path.machining_time_s),
@@ -87,9 +110,8 @@ fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
 }
 
 /// What was not planned has a name and a verdict.
-fn missing_row(out: &mut String, t: &NotPlanned) -> std::fmt::Result {
-    let name = shortened(&t.name, NAME_WIDTH);
-    row(out, [&name, "-", "-", "-", "-", "-", "-", "-", "-", "-", t.verdict.word()])
+fn missing_row(out: &mut String, width: usize, t: &NotPlanned) -> std::fmt::Result {
+    row(out, width, [&t.name, "-", "-", "-", "-", "-", "-", "-", "-", "-", t.verdict.word()])
 }
 
 /// Widest line, letters.
@@ -118,8 +140,10 @@ pub fn result_table(report: &RunReport) -> String {
 
 fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
     writeln!(out, "{}", report.title)?;
+    let width = name_width(report);
     row(
         out,
+        width,
         [
             "toolpath",
             "passes",
@@ -134,12 +158,12 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
             "verdict",
         ],
     )?;
-    row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
-    writeln!(out, "{}", "-".repeat(WIDTH))?;
+    row(out, width, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
+    writeln!(out, "{}", "-".repeat(WIDTH - NAME_WIDTH + width))?;
     for toolpath in &report.toolpaths {
         match toolpath {
-            ToolpathReport::Measured(t) => toolpath_row(out, t)?,
-            ToolpathReport::NotPlanned(t) => missing_row(out, t)?,
+            ToolpathReport::Measured(t) => toolpath_row(out, width, t)?,
+            ToolpathReport::NotPlanned(t) => missing_row(out, width, t)?,
         }
     }
     write_sentences(out, report)?;
@@ -237,6 +261,27 @@ mod tests {
         assert_eq!(with_bound(Some(0.0194), Some(1e-9)), "19.4 ± 0.01");
         assert_eq!(with_bound(Some(0.0194), Some(0.01234)), "19.4 ± 12.4");
         assert_eq!(with_bound(Some(0.0), Some(0.0)), "0.00 ± 0.00");
+    }
+
+    /// Names of a comparison differ in what stands last.
+    #[test]
+    fn rows_can_be_told_apart_by_their_names() {
+        assert_eq!(without_middle("iso-scallop, 0.25 min", 16), "iso-sca…0.25 min");
+        assert_eq!(without_middle("sixteen letters.", 16), "sixteen letters.");
+        let names = |[a, b]: [&str; 2]| {
+            let mut report = fixture::report();
+            for (row, name) in report.toolpaths.iter_mut().zip([a, b]) {
+                if let super::super::result::ToolpathReport::Measured(result) = row {
+                    name.clone_into(&mut result.name);
+                }
+            }
+            result_table(&report)
+        };
+        let table = names(["iso-scallop, 0.25 min", "iso-scallop, 0.3 min"]);
+        assert!(table.contains("\niso-sca…0.25 min ") && table.contains("\niso-sca… 0.3 min "), "{table}");
+        // Where the middle alone differs, names are shown in full.
+        let table = names(["finish with step A on the left", "finish with step B on the left"]);
+        assert!(table.contains("\nfinish with step A on the left "), "{table}");
     }
 
     /// Walls of pockets count as the surface does, with the bound of what their chords are off.

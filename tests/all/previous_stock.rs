@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
+use millstream::geometry::Point3;
 use serde_json::Value;
 
 use crate::command::millstream;
+use crate::support::write_stl;
 
 const PLATE: &str = "[part]\nsurface = \"plane\"\nx = [0, 12]\ny = [0, 8]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
                      [simulation]\ncell = 0.1\n";
@@ -72,6 +74,77 @@ fn a_gouge_of_an_earlier_toolpath_is_named() {
     }
     let text = report["toolpaths"][1]["violations"].to_string();
     assert!(text.contains("of the toolpath rough before this one, line 6"), "{text}");
+}
+
+/// A wall of 5 × 8 mm that leans by so much, mm, and the level ground behind it.
+fn steep_wall(home: &Path, lean: f64) {
+    let [a, b, c, d] =
+        [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, lean, 8.0], [0.0, lean, 8.0]].map(Point3::from);
+    let [e, f] = [[5.0, 3.0, 8.0], [0.0, 3.0, 8.0]].map(Point3::from);
+    write_stl(&home.join("wall.stl"), &[[a, b, c], [a, c, d], [d, c, e], [d, e, f]]);
+}
+
+/// Level passes 1 mm apart along a wall of 85 degrees: no cell sees their ridges, and the table does.
+#[test]
+fn ridges_where_no_cell_sees_are_among_the_scallops() {
+    let home = tempfile::tempdir().unwrap();
+    let (lean, radius) = (0.7, 2.0f64);
+    steep_wall(home.path(), lean);
+    let long = 8f64.hypot(lean);
+    let pass = |k: i32| {
+        let z = 1.0 + f64::from(k);
+        let y = (lean * (z + radius) - radius * long) / 8.0;
+        let [from, to] = if k % 2 == 0 { [-4, 9] } else { [9, -4] };
+        format!("G1 X{from} Y{y:.6} Z{z}\nX{to}\n")
+    };
+    let passes: String = (0..5).map(pass).collect();
+    let program = format!("G21 G90\nS9000 M3\nG0 X-4 Y-9 Z12\nG0 Z1\nF900\n{passes}G0 Z12\nM30\n");
+    std::fs::write(home.path().join("wall.nc"), program).unwrap();
+    let scene = "[part]\nfile = \"wall.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[stock]\nmargin = 5\n\
+                 [tolerance]\nscallop = 0.04\n[[toolpath]]\nstrategy = \"program\"\nfile = \"wall.nc\"\n";
+    let (_, report) = run(home.path(), scene);
+    let toolpath = &report["toolpaths"][0];
+    // A ridge stands between the shank of one pass and the ball of the next one above it.
+    let aside = lean / 8.0;
+    let up = 1.0 - (radius * radius - (radius - aside).powi(2)).sqrt();
+    let closed = (aside * up + radius * (long / 8.0 - 1.0)) * 8.0 / long;
+    let highest = number(toolpath, "/scallop/max_mm");
+    assert!((highest - closed).abs() < 1e-4, "{highest} {closed}: {}", toolpath["scallop"]);
+    assert_eq!(toolpath["scallop"], toolpath["coverage"]["unseen"]["scallop"]);
+}
+
+/// A ball comes 0.24 mm into a wall of 85 degrees at one place, where no cell sees. Before and after a program
+/// that cuts nothing there it is the same move and line.
+#[test]
+fn a_gouge_where_no_cell_sees_is_named_as_others_are() {
+    let home = tempfile::tempdir().unwrap();
+    let lean = 0.7;
+    steep_wall(home.path(), lean);
+    let head = "G21 G90\nS9000 M3\nG0 X-4 Y-1.9 Z12\nZ1\n";
+    let program = |name: &str, rest: &str| {
+        std::fs::write(home.path().join(format!("{name}.nc")), format!("{head}{rest}")).unwrap();
+        format!("[[toolpath]]\nname = \"{name}\"\nstrategy = \"program\"\nfile = \"{name}.nc\"\n")
+    };
+    let deep = program("deep", "G1 X2.5 F900\nY-1.5\nY-1.9\nX9\nG0 Z12\nM30\n");
+    let clear = program("clear", "G1 X0 F900\nX1\nX2\nX3\nX9\nG0 Z12\nM30\n");
+    let part = "[part]\nfile = \"wall.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[stock]\nmargin = 5\n";
+    let depth = 2.0 - (1.5 * 8.0 + lean * 3.0) / 8f64.hypot(lean);
+    for (scene, k, toolpath) in [
+        (deep.clone(), 0, None),
+        (format!("{clear}{deep}{PREVIOUS}"), 1, None),
+        (format!("{deep}{clear}{PREVIOUS}"), 1, Some("deep")),
+    ] {
+        let (code, report) = run(home.path(), &format!("{part}{scene}"));
+        assert_eq!(code, Some(1), "{report}");
+        let gouge = &report["toolpaths"][k]["coverage"]["unseen"]["gouge"];
+        let region = &gouge["regions"][0];
+        assert!((number(region, "/depth_mm") - depth).abs() < 1e-3, "{depth} {gouge}");
+        assert_eq!([&region["move"], &region["line"]], [3, 6], "{gouge}");
+        assert_eq!(region.get("toolpath").and_then(Value::as_str), toolpath, "{gouge}");
+        let text = report["toolpaths"][k]["violations"].to_string();
+        let of = toolpath.map_or(", deep.nc", |_| " of the toolpath deep before this one,");
+        assert!(text.contains(&format!("move 3{of} line 6, measured along normals")), "{text}");
+    }
 }
 
 /// What a toolpath left to one that could not be planned is its own: it fails. Behind one that passes,

@@ -281,9 +281,10 @@ impl PairClearance {
         }
         let index = self.move_index.unwrap_or_default();
         let text = format!(
-            "{} collides with {}, at least {:.3} mm deep, at {}, move {index}{}{}",
+            "{} collides with {}, at least {:.*} mm deep, at {}, move {index}{}{}",
             capital(&self.tool),
             self.other,
+            decimals(clearance),
             -clearance,
             place(self.at_mm.unwrap_or_default()),
             run.program_line(index),
@@ -310,9 +311,10 @@ impl PairClearance {
         match (self.clearance_mm, self.error_bound_mm) {
             // A bound that is not zero never reads as zero.
             (Some(clearance), Some(bound)) => {
-                format!("{clearance:.3} ± {:.3}", (1e3 * bound - 1e-9).ceil() / 1e3)
+                let (digits, unit) = (decimals(clearance), 10f64.powi(decimals(clearance) as i32));
+                format!("{clearance:.digits$} ± {:.digits$}", (unit * bound - 1e-9).ceil() / unit)
             }
-            (Some(clearance), None) => format!("{clearance:.3}, or less"),
+            (Some(clearance), None) => format!("{clearance:.*}, or less", decimals(clearance)),
             (None, Some(bound)) if bound < FAR => format!("over {:.3} mm", FAR - bound),
             (None, _) => "open".to_owned(),
         }
@@ -330,6 +332,13 @@ impl PairClearance {
             number(self.line),
         ]
     }
+}
+
+/// Decimals of a length in mm: three, and of a collision as many more as show that it is one.
+fn decimals(clearance: f64) -> usize {
+    const MOST: usize = 9;
+    let shows = |digits: &usize| -clearance >= 0.5 * 0.1f64.powi(*digits as i32);
+    if clearance < 0.0 { (3..MOST).find(shows).unwrap_or(MOST) } else { 3 }
 }
 
 fn capital(text: &str) -> String {

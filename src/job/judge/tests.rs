@@ -146,6 +146,21 @@ fn a_remnant_beside_a_border_answers_to_the_scallop_limit() {
     assert_eq!(not_held(&measured, &STRICT), [("uncut", Verdict::Fail)]);
 }
 
+/// A scallop above both limits is one violation, unless uncut material has a place of its own or stands higher.
+#[test]
+fn a_flank_of_a_scallop_is_no_violation_of_its_own() {
+    let mut measured = measurement(0.0);
+    measured.scallop.max_mm = Some(0.2);
+    measured.uncut.max_height_mm = 0.199;
+    measured.excess.unreached = Bounded::new(0.199, 1e-6);
+    assert_eq!(not_held(&measured, &STRICT), [("scallop", Verdict::Fail)]);
+    measured.excess.unreached.at_mm = Some([1.0, 2.0, 3.0]);
+    let both = [("uncut", Verdict::Fail), ("scallop", Verdict::Fail)];
+    assert_eq!(not_held(&measured, &STRICT), both);
+    measured.excess.unreached = Bounded::new(0.201, 1e-6);
+    assert_eq!(not_held(&measured, &STRICT), both);
+}
+
 /// A place that no move cuts away decides by itself, however much more may stand elsewhere; cells alone do
 /// not.
 #[test]
@@ -212,6 +227,11 @@ fn a_gouge_names_move_and_line() {
     let text = judged(&measurement(0.032), &STRICT).1[0].text.clone();
     assert!(text.contains("gouge 32.0 ± 0.50 µm deep (limit 5.00)"), "{text}");
     assert!(text.contains("at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240"), "{text}");
+    let mut measured = measurement(0.032);
+    measured.gouge.regions[0] =
+        GougeRegion { move_index: NOT_CUT, line: 0, ..measured.gouge.regions[0].clone() };
+    let text = judged(&measured, &STRICT).1[0].text.clone();
+    assert!(text.ends_with("at x 12.500 y 7.250 z -1.032"), "{text}");
 }
 
 #[test]

@@ -44,10 +44,22 @@ pub struct CoverageFigures {
 
 impl CoverageFigures {
     /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all
-    /// of it, mm².
-    pub fn of_pocket(judge: Judged, [floor, whole_floor]: [f64; 2], [walls, all_walls]: [f64; 2]) -> Self {
-        let out_of_reach_mm2 = (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0);
-        Self { judge, by_cells_mm2: floor, by_moves_mm2: walls, out_of_reach_mm2, ..Self::default() }.summed()
+    /// of it, and the bound of their errors, mm².
+    pub fn of_pocket(
+        judge: Judged,
+        [floor, whole_floor]: [f64; 2],
+        [walls, all_walls]: [f64; 2],
+        error_bound_mm2: f64,
+    ) -> Self {
+        Self {
+            judge,
+            by_cells_mm2: floor,
+            by_moves_mm2: walls,
+            out_of_reach_mm2: (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0),
+            error_bound_mm2,
+            ..Self::default()
+        }
+        .summed()
     }
 
     /// With the sums and the words.
@@ -125,7 +137,7 @@ mod tests {
             CoverageFigures { by_cells_mm2: 1000.0, hidden_mm2: 0.04, ..Default::default() }.summed();
         assert_eq!(nearly.scope, "on 99.99 % of the surface; not judged: hidden from above 0.0400 mm²");
         assert_eq!(CoverageFigures { by_cells_mm2: 7.0, ..Default::default() }.summed().scope, "");
-        let pocket = CoverageFigures::of_pocket(Judged::Facing, [90.0, 100.0], [50.0, 55.0]);
+        let pocket = CoverageFigures::of_pocket(Judged::Facing, [90.0, 100.0], [50.0, 55.0], 0.5);
         assert_eq!((pocket.surface_mm2, pocket.judged_mm2), (155.0, 140.0));
         assert!(pocket.scope.ends_with("out of the cutter's reach 15.0 mm²"), "{}", pocket.scope);
         assert_eq!(CoverageFigures::default().share(), 0.0);

@@ -121,8 +121,10 @@ impl Leading<'_> {
     /// As much of a move on the surface as is clear, at its begin and at its end.
     fn cut_off(&mut self, from: &ClPoint, step: &Move) {
         let length = (step.to.tip - from.tip).norm();
+        // What goes on from either end keeps all that is needed; a move counts as clear a little before.
         let clear = |a: f64, b: f64| {
-            self.keep.on_move(&from.towards(&step.to, a), &from.towards(&step.to, b)).is_none()
+            let ends = [a, b].map(|share| from.towards(&step.to, share));
+            ends.iter().all(|end| self.keep.is_clear(end)) && self.keep.on_move(&ends[0], &ends[1]).is_none()
         };
         let first = self.keep.is_clear(from).then(|| halved(|t| clear(0.0, t)));
         let last = self.keep.is_clear(&step.to).then(|| 1.0 - halved(|t| clear(1.0 - t, 1.0)));

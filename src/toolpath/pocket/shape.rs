@@ -185,9 +185,6 @@ impl Pocket {
 
     /// Length of its walls in the plan view: of the sides that are not open, mm.
     pub fn wall_length(&self) -> f64 {
-        let around = |curve: &[Point2]| -> f64 {
-            (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
-        };
         let open: f64 = self.open.iter().map(|[a, b]| (b - a).norm()).sum();
         self.region.curves().map(around).sum::<f64>() - open
     }
@@ -198,6 +195,34 @@ impl Pocket {
         self.reached_walls(radius).iter().map(WallStretch::length).sum()
     }
 
+    /// How much longer or shorter the walls may be that a cutter of a radius comes to, mm: what touches is told
+    /// with the tolerance of `reached_walls`, and beside the end of a stretch the cutter parts from the wall
+    /// with the second order of the way.
+    pub fn reached_wall_length_bound(&self, radius: f64) -> f64 {
+        let off = self.off_wall(radius);
+        let beside_end = (off * (2.0 * radius + off)).sqrt();
+        let reached = self.reached_walls(radius);
+        let joins = |end: &Point2, begin: &Point2| (end - begin).norm() < ON_WALL;
+        let goes_on = |k: usize| {
+            let end = &reached[k].ends[1];
+            let next = reached.get(k + 1).is_some_and(|next| joins(end, &next.ends[0]));
+            next || reached.iter().any(|other| joins(end, &other.ends[0]))
+        };
+        let open = (0..reached.len()).filter(|k| !goes_on(*k)).count();
+        // A stretch that ends somewhere begins somewhere.
+        2.0 * open as f64 * beside_end
+    }
+
+    /// Bound of the areas of its region and of its floor, mm²: chords of outlines and of offsets beside them.
+    pub fn floor_area_bound(&self, radius: f64) -> f64 {
+        self.off_wall(radius) * self.region.curves().map(around).sum::<f64>()
+    }
+
+    /// How far a cutter of a radius may stand off a wall that it touches, mm.
+    fn off_wall(&self, radius: f64) -> f64 {
+        2.0 * Region::offset_excess(radius) + self.off_drawing + ON_WALL
+    }
+
     /// The walls that a cutter of a radius touches from some place where it fits, as
     /// [`Self::reached_wall_length`] counts them, and the edges that it goes around.
     pub fn reached_walls(&self, radius: f64) -> Vec<WallStretch> {
@@ -205,7 +230,7 @@ impl Pocket {
         if centres.region().is_empty() {
             return Vec::new();
         }
-        let off = 2.0 * Region::offset_excess(radius) + self.off_drawing + ON_WALL;
+        let off = self.off_wall(radius);
         let left = |[a, b]: &[Point2; 2]| (b - a).try_normalize(0.0).map(|d| Vector2::new(-d.y, d.x));
         let mut found = Vec::new();
         for curve in self.region.curves() {
@@ -284,6 +309,11 @@ impl Pocket {
     fn within(&self, swept: Region) -> Region {
         if self.open.is_empty() { swept } else { swept.intersection(&self.region) }
     }
+}
+
+/// Length around a closed curve, mm.
+fn around(curve: &[Point2]) -> f64 {
+    (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
 }
 
 /// Makes a place on a side a corner; `None` where it lies on none.
@@ -434,6 +464,8 @@ mod tests {
         let [short, long] = [3.0_f64 + e, 3.0 + 2.0 * e + ON_WALL];
         let beside_corner = short - (long * long - short * short).sqrt();
         assert!((reached - (80.0 - 8.0 * beside_corner)).abs() < 1e-4, "{reached}");
+        let bound = square().reached_wall_length_bound(3.0);
+        assert!((reached - (80.0 - 8.0 * 3.0)).abs() <= bound && bound < 0.5, "{reached} {bound}");
         let circle = |r: f64, n: usize| -> Vec<Point2> {
             let at = |k: usize| std::f64::consts::TAU * k as f64 / n as f64;
             (0..n).map(|k| Point2::new(r * at(k).cos(), r * at(k).sin())).collect()
@@ -445,6 +477,7 @@ mod tests {
         assert!((ring.reached_wall_length(1.5) - ring.wall_length()).abs() < 1e-9);
         let slot = Pocket { off_drawing, ..Pocket::new(Region::nested(vec![circle(r, n)]).unwrap().0, 1.0) };
         assert!((slot.reached_wall_length(4.9) - slot.wall_length()).abs() < 1e-9);
+        assert_eq!(slot.reached_wall_length_bound(4.9), 0.0);
         assert_eq!(slot.reached_wall_length(5.1), 0.0);
     }
 

@@ -198,3 +198,17 @@ fn an_upright_holder_is_held_against_the_stock_that_stands_when_it_comes() {
         "{sentence}"
     );
 }
+
+/// A collision never reads as none.
+#[test]
+fn small_collisions_are_told_with_digits_that_show_them() {
+    let shown = |clearance, bound| {
+        let pair = super::PairClearance::new(("cutter", "post.stl".into()));
+        super::PairClearance { clearance_mm: Some(clearance), error_bound_mm: bound, ..pair }.shown()
+    };
+    assert_eq!(shown(-0.0002, Some(0.00103)), "-0.0002 ± 0.0011");
+    assert_eq!(shown(-0.00004, None), "-0.00004, or less");
+    assert_eq!(shown(-0.002, Some(0.00103)), "-0.002 ± 0.002");
+    assert_eq!(shown(0.0002, Some(0.00103)), "0.000 ± 0.002");
+    assert_eq!(shown(-1.25, None), "-1.250, or less");
+}
