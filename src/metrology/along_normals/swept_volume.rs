@@ -317,11 +317,14 @@ impl AlongNormal for SweptVolume<'_> {
         }
         match ridge {
             Some(normals) => {
-                let looked = [2.0 * thin.radius, depth];
+                let own = if is_near { Some(found) } else { look(self.inward) };
+                let looked = [2.0 * thin.radius, own.map_or(depth, |own| -own.deviation)];
                 let cut = self.on_ridge(point, normals, looked, found);
                 let corner = corner_at(self.part, point, &normals, normal, -cut.deviation);
                 let of_corner = corner.map(|normals| self.on_ridge(point, normals, looked, found));
-                of_corner.into_iter().chain([cut]).max_by(|a, b| a.deviation.total_cmp(&b.deviation))
+                // The lesser way counts; of equals the normal, along which slopes are told.
+                let ways = of_corner.into_iter().chain([cut]).chain(own);
+                ways.max_by(|a, b| a.deviation.total_cmp(&b.deviation))
             }
             // What the far side of a thin part has lost is no loss of this one.
             None => {

@@ -250,6 +250,28 @@ fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
     }
 }
 
+/// A ball plunges aside into a wall of 85 degrees, a millimetre below its top, where its shank cuts as well: the
+/// way along the middle between wall and top is longer than the one along the wall's normal.
+#[test]
+fn a_deep_cut_below_a_step_is_as_deep_as_the_lesser_way() {
+    let (lean, high, radius) = (0.35, 4.0, 2.0);
+    let corners = [[0.0, 0.0], [lean, high], [3.0, high]];
+    let corners = corners.iter().flat_map(|&[y, z]| [0.0, 5.0].map(|x| Point3::new(x, y, z))).collect();
+    let triangles = vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]];
+    let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+    let ball = Cutter::ball(2.0 * radius).unwrap();
+    let solid = Solid::of_cutter(&ball, None);
+    let path = path(&[[-1.9, -1.5].map(|y| Point3::new(2.5, y, 1.0)).to_vec()]);
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let cut = swept(&part, &by_rays, 2.0);
+    let (found, _) =
+        measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-3, None, &Silent).unwrap();
+    let gouge = &found.gouge;
+    let truth = radius - (1.5 * high + lean * (1.0 + radius)) / high.hypot(lean);
+    assert!((gouge.max_depth_mm - truth).abs() <= gouge.error_bound_mm, "{truth} {gouge:?}");
+}
+
 /// A wall, the ground that falls from its crest, and walls at both ends of it, cut as deep as the ground lies
 /// below its passes: the way inward from the crest leads out over the ground, and at the corners from ridge
 /// to ridge over a third face.
