@@ -25,7 +25,7 @@ mod solid;
 mod turning;
 mod words;
 
-use report::{Claim, Figure, FigureFile};
+use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
 pub(crate) use least_left::LeastLeftFigures;
@@ -85,9 +85,15 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
 }
 
 /// Material that a toolpath leaves for the next one is no fault of it: those limits, which come second, are
-/// the last one's.
+/// the last one's. So is what is undecided of its gouges, because the last one is measured with all moves:
+/// beside material that was never cut bounds are wide.
 pub(crate) fn before_others(claims: Vec<Claim>) -> [Vec<Claim>; 2] {
-    let (left, own) = claims.into_iter().partition(|claim| ["uncut", "scallop"].contains(&claim.what));
+    let is_left = |claim: &Claim| match claim.what {
+        "uncut" | "scallop" => true,
+        "gouge" => claim.verdict() == Verdict::Undecided,
+        _ => false,
+    };
+    let (left, own) = claims.into_iter().partition(is_left);
     [own, left]
 }
 
