@@ -222,10 +222,9 @@ mod tests {
             let ends = cut_ends(&plan);
             for axis in 0..2 {
                 let farthest = ends.iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
-                // The target is planned for less what chords may add. Of planes the last one stands no farther
-                // than the widest step from the end, that of the level top.
-                let level_step = 2.0 * (cutter.radius() - corner) + interval;
-                let off = if axis == 0 { 0.01 } else { level_step };
+                // The target is planned for less what chords may add. Planes stand half a step from the end, which
+                // on the level top is wider by the flat.
+                let off = if axis == 0 { 0.01 } else { interval + cutter.radius() - corner };
                 assert!(farthest <= end + 1e-3 && farthest >= end - off, "{axis}: {farthest} {end}");
             }
             let mut lines: Vec<i64> = ends.iter().map(|p| (p.y * 1e3).round() as i64).collect();

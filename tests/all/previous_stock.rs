@@ -24,6 +24,14 @@ fn run(home: &Path, scene: &str) -> (Option<i32>, Value) {
     (answer.code, serde_json::from_slice(&report).unwrap())
 }
 
+/// The scene cannot run, and the message says so.
+fn refused(home: &Path, scene: &str, text: &str) {
+    std::fs::write(home.join("scene.toml"), scene).unwrap();
+    let answer = millstream(home, &["run", "scene.toml", "--out", "out"]);
+    let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(answer.code == Some(2) && words.contains(text), "{}{words}", answer.stdout);
+}
+
 fn number(toolpath: &Value, pointer: &str) -> f64 {
     toolpath.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer}: {toolpath}"))
 }
@@ -187,12 +195,7 @@ fn where_none_can_be_planned_each_says_why() {
 #[test]
 fn what_has_no_previous_stock_says_so() {
     let home = tempfile::tempdir().unwrap();
-    let refused = |scene: &str, text: &str| {
-        std::fs::write(home.path().join("scene.toml"), scene).unwrap();
-        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
-        assert_eq!(answer.code, Some(2), "{}", answer.stdout);
-        assert!(answer.stderr.contains(text), "{}", answer.stderr);
-    };
+    let refused = |scene: &str, text: &str| refused(home.path(), scene, text);
     refused(&format!("{PLATE}{ROUGH}{PREVIOUS}"), "no toolpath comes before this one");
     refused(&format!("{PLATE}{ROUGH}{FINISH}stock = \"next\"\n"), "cannot be \"next\"");
     let leaning = format!("{PLATE}{ROUGH}{FINISH}{PREVIOUS}axis = {{ lead = 10 }}\n");
@@ -263,12 +266,7 @@ fn levels_are_no_deeper_than_the_stepdown() {
 #[test]
 fn roughing_that_cannot_be_meant_is_refused() {
     let home = tempfile::tempdir().unwrap();
-    let refused = |scene: &str, text: &str| {
-        std::fs::write(home.path().join("scene.toml"), scene).unwrap();
-        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
-        assert_eq!(answer.code, Some(2), "{}", answer.stdout);
-        assert!(answer.stderr.contains(text), "{}", answer.stderr);
-    };
+    let refused = |scene: &str, text: &str| refused(home.path(), scene, text);
     let leaving = format!("{ROUGH}allowance = 0.2\n");
     refused(&format!("{PLATE}{leaving}{FINISH}"), "no toolpath behind it cuts that off");
     refused(&format!("{PLATE}{leaving}"), "no toolpath behind it cuts that off");
@@ -351,9 +349,6 @@ fn a_boundary_keeps_the_axis_within() {
         ("boundary = [[[0, 0], [4, 4], [4, 0], [0, 4]]]\n", "neither cross nor touch"),
         ("rest = true\n", "the rest is what the toolpaths before it left"),
     ] {
-        std::fs::write(home.path().join("scene.toml"), format!("{PLATE}{}", stage("bad", bad))).unwrap();
-        let answer = millstream(home.path(), &["run", "scene.toml"]);
-        let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(answer.code == Some(2) && words.contains(text), "{words}");
+        refused(home.path(), &format!("{PLATE}{}", stage("bad", bad)), text);
     }
 }
