@@ -7,8 +7,9 @@
 
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::vocabulary::Setup;
+use cutter::Solid;
 use drop_cutter::DropCutter;
-use geometry::{Point2, Point3};
+use geometry::{Aabb, Point2, Point3};
 use work::monitor::Cancelled;
 
 /// Share of the chord tolerance that sampling may use; thinning uses the rest.
@@ -17,13 +18,16 @@ const SAMPLING_SHARE: f64 = 0.4;
 /// First sampling distance over the cutter's radius.
 const SAMPLING: f64 = 0.1;
 
+/// Halvings of the distance from the stock at which a tool comes down: fewer than its rounding allows.
+const HALVINGS: usize = 40;
+
 /// Where a tool may come down beside the stock.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Sides {
-    /// Outside of these places of the plan view the tool is clear.
-    corners: [Point2; 2],
-    /// No way in is longer, mm.
-    longest: f64,
+    block: Aabb,
+    cutter: Solid,
+    clearance: f64,
+    longest_link: f64,
 }
 
 impl Sides {
@@ -31,14 +35,28 @@ impl Sides {
     /// the stock a way in is no longer than a link.
     pub fn of(setup: &Setup<'_>, longest_link: f64) -> Option<Self> {
         let block = setup.settings.stock.filter(|_| setup.settings.may_enter_beside)?;
-        let away = setup.cutter.radius() + setup.settings.clearance;
-        let corners = [block.min.xy().map(|x| x - away), block.max.xy().map(|x| x + away)];
-        Some(Self { corners, longest: longest_link + away })
+        let cutter = Solid::of_cutter(setup.cutter, None);
+        Some(Self { block, cutter, clearance: setup.settings.clearance, longest_link })
+    }
+
+    /// How far from the block the axis of a cutter stays whose tip goes down to a height: the block's upper
+    /// edge is as near as any of it, since cutters widen upward.
+    fn away(&self, tip_z: f64) -> f64 {
+        let edge = self.block.max.z - tip_z;
+        let (mut near, mut clear) = (0.0, self.cutter.radius() + self.clearance);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (near + clear);
+            let is_clear = self.cutter.outline_foot(middle, edge).distance >= self.clearance;
+            *(if is_clear { &mut clear } else { &mut near }) = middle;
+        }
+        clear
     }
 
     /// The nearest place beside the stock; `None` where it is too far away.
     pub fn nearest(&self, to: &Point3) -> Option<Point2> {
-        let [low, high] = self.corners;
+        let away = self.away(to.z);
+        let [low, high] =
+            [self.block.min.xy().map(|x| x - away), self.block.max.xy().map(|x| x + away)];
         let places = [
             Point2::new(low.x, to.y),
             Point2::new(high.x, to.y),
@@ -47,7 +65,7 @@ impl Sides {
         ];
         let distances = places.map(|place| ((place - to.xy()).norm(), place));
         let nearest = distances.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.filter(|(distance, _)| *distance <= self.longest).map(|(_, place)| place)
+        nearest.filter(|(distance, _)| *distance <= self.longest_link + away).map(|(_, place)| place)
     }
 
     /// The tips from beside the stock up to and with the beginning of a pass.
@@ -78,5 +96,31 @@ impl Sides {
         }
         tips[last] = to;
         Ok(Some(reduce(&tips, tolerance - fine, &mut watch)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cutter::Cutter;
+
+    #[test]
+    fn a_tool_comes_down_as_far_from_the_edge_of_the_block_as_rapids_stay_above_it() {
+        let block = Aabb { min: Point3::new(0.0, 0.0, -9.0), max: Point3::new(20.0, 20.0, 1.0) };
+        let sides = |cutter: &Cutter| Sides {
+            block,
+            cutter: Solid::of_cutter(cutter, None),
+            clearance: 2.0,
+            longest_link: 1.0,
+        };
+        let ball = sides(&Cutter::ball(6.0).unwrap());
+        // Its centre passes the edge 2 mm above it, level with it, and 3 mm below.
+        for (tip, away) in [(0.0, 21f64.sqrt()), (-2.0, 5.0), (-5.0, 5.0)] {
+            assert!((ball.away(tip) - away).abs() < 1e-9, "{tip}: {}", ball.away(tip));
+        }
+        let place = ball.nearest(&Point3::new(1.0, 10.0, 0.0)).unwrap();
+        assert!((place - Point2::new(-21f64.sqrt(), 10.0)).norm() < 1e-9, "{place}");
+        let flat = sides(&Cutter::flat(6.0).unwrap());
+        assert!((flat.away(0.0) - 5.0).abs() < 1e-9 && flat.nearest(&Point3::new(3.1, 10.0, 0.0)).is_none());
     }
 }
