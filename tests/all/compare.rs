@@ -202,6 +202,18 @@ fn streamlines_are_the_quickest_of_all_on_eight_surfaces() {
 }
 
 /// The scene with zigzag and the shortest streamlines only, their passes joined on the surface and with cells
+/// Along a border to which passes are nearly parallel, levels lie beside the part all along, and serve what
+/// no level on it reaches.
+#[test]
+fn borders_of_joined_patches_hold_the_target_as_first_planned() {
+    let scene = scene("joined").replace("[tolerance]", "[tolerance]\ncorrect = false");
+    let scene = scene.replace("cell = 0.1", "cell = 0.5\nerror_bound = 1.0");
+    let (head, _) = scene.split_once("[[toolpath]]").unwrap();
+    let (_, report) = run_scene(&written(&format!("{head}[[toolpath]]\nstrategy = \"streamline\"\n")));
+    let highest = number(&report, "/toolpaths/0/excess/max_mm");
+    assert!(highest <= 1.05 * 0.01, "{highest}");
+}
+
 /// that are coarse: turns are those of the moves.
 fn joined_on_the_surface(scene: &str) -> String {
     let (head, _) = scene.split_once("[[toolpath]]").unwrap();

@@ -234,7 +234,8 @@ impl ChartGuide<'_> {
         if strayed { between } else { q }
     }
 
-    /// The stretches of a run that are worth cutting; `None` where all of it lies outside.
+    /// The stretches of a run that are worth cutting; `None` without any. What lies outside all along may
+    /// serve the border beside it, where ψ has its greatest value elsewhere.
     fn useful_stretches(
         &self,
         at: &dyn Fn(f64) -> [f64; 2],
@@ -242,10 +243,17 @@ impl ChartGuide<'_> {
         closed: bool,
     ) -> Option<Vec<Stretch>> {
         let mut stretches = self.stretches(at, first, end);
+        if !stretches.iter().any(|s| s.inside) {
+            let steps = ((end - first) as f64 / OVERRUN_STEP).ceil() as usize;
+            let place = |k: usize| first as f64 + (end - first) as f64 * k as f64 / steps as f64;
+            let serves = |k: &usize| self.serves(at(place(*k)));
+            let (from, to) = ((0..=steps).find(serves)?, (0..=steps).rev().find(serves)?);
+            return (from < to).then(|| vec![Stretch { inside: false, from: place(from), to: place(to) }]);
+        }
         if !closed {
             self.shorten_ends(&mut stretches, at);
         }
-        stretches.iter().any(|s| s.inside).then_some(stretches)
+        Some(stretches)
     }
 
     /// Whether half an interval to either side of a place outside, where the cutter cuts, lies the chart.
@@ -391,4 +399,58 @@ struct Stretch {
     inside: bool,
     from: f64,
     to: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vocabulary::{Faces, Pace};
+    use field::GridField;
+    use geometry::{AnalyticShape, AnalyticSurface, distance_to_segment};
+    use part::{Part, Patch};
+    use std::f64::consts::PI;
+    use work::monitor::Silent;
+
+    /// Along a border ψ rises twice, the second time to 0.7 less: no level that lies on the part is within
+    /// half an interval of it there.
+    #[test]
+    fn a_level_that_lies_beside_the_border_all_along_serves_it() {
+        const SIDE: f64 = 10.0;
+        let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-SIDE, SIDE]; 2]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(plane)], 0.002).unwrap();
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = PassSettings {
+            step: Step::Stepover(1.0),
+            sampling: 0.3,
+            chord_tolerance: 0.001,
+            smoothing: None,
+            axis: None,
+            faces: Faces::ALL,
+            memory: u64::MAX,
+            earlier: None,
+            probe: None,
+        };
+        let pace = Pace { duration: &|passes, _| Ok(passes.length()), link: 1.0, bend: 0.1 };
+        let task = Task { part: &part, cutter: &cutter, settings, wants_mesh: false, pace, monitor: &Silent };
+        const CELLS: usize = 200;
+        let at = |k: usize| SIDE * (2.0 * k as f64 / CELLS as f64 - 1.0);
+        let rise = |u: f64| {
+            let wave = (PI * u / 5.0).cos();
+            if u < 0.0 { -wave } else { -0.65 * wave - 0.35 }
+        };
+        let psi = |k: usize| at(k / (CELLS + 1)) + rise(at(k % (CELLS + 1)));
+        let values: Vec<f64> = (0..(CELLS + 1).pow(2)).map(psi).collect();
+        let field = ScalarField::Grid(GridField::new([[-SIDE, SIDE]; 2], [CELLS; 2], &values).unwrap());
+        let charts = Chart::all(&part, &cutter, settings.guide()).unwrap();
+        let passes = along_levels_placed(&task, &charts[0], &field, LevelSteps::Constant).unwrap().passes;
+        let farthest = (-95..=95).map(|k| {
+            let p = Point3::new(0.1 * f64::from(k), SIDE, 0.0);
+            let flat = |p: &Point3| Point3::new(p.x, p.y, 0.0);
+            let beside = passes.iter().flat_map(|pass| pass.windows(2));
+            let beside = beside.map(|w| distance_to_segment(&p, &flat(&w[0]), &flat(&w[1])));
+            (beside.fold(f64::INFINITY, f64::min), p.x)
+        });
+        let (distance, x) = farthest.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        assert!(distance <= 0.5 * 1.02, "{distance} mm at x = {x}");
+    }
 }

@@ -55,8 +55,7 @@ impl Sides {
     /// The nearest place beside the stock; `None` where it is too far away.
     pub fn nearest(&self, to: &Point3) -> Option<Point2> {
         let away = self.away(to.z);
-        let [low, high] =
-            [self.block.min.xy().map(|x| x - away), self.block.max.xy().map(|x| x + away)];
+        let [low, high] = [self.block.min.xy().map(|x| x - away), self.block.max.xy().map(|x| x + away)];
         let places = [
             Point2::new(low.x, to.y),
             Point2::new(high.x, to.y),

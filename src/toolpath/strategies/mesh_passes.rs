@@ -436,8 +436,8 @@ impl MeshGuide<'_> {
         Some((Allowed { step: gradient.norm() * width, width }, too_concave))
     }
 
-    /// The knots of a curve, less what runs beyond the border without use; nothing when none of it lies
-    /// on the part.
+    /// The knots of a curve, less what runs beyond the border without use. What lies beyond it all along may
+    /// serve the border beside it, where ψ has its greatest value elsewhere.
     fn knots(&self, curve: &MeshCurve) -> Vec<Knot> {
         let mut knots: Vec<Knot> = Vec::with_capacity(curve.points.len() + 1);
         // Index of each point's last knot.
@@ -468,7 +468,10 @@ impl MeshGuide<'_> {
         let own = |p: &MeshPoint| (p.triangle as usize) < self.surface.own_triangles;
         let (Some(first), Some(last)) = (stretches.iter().position(own), stretches.iter().rposition(own))
         else {
-            return Vec::new();
+            let serves = |p: &MeshPoint| self.serves(p);
+            let (first, last) = (curve.points.iter().position(serves), curve.points.iter().rposition(serves));
+            let served = first.zip(last).filter(|(first, last)| first < last);
+            return served.map_or_else(Vec::new, |(k, l)| knots[knot_of[k]..=knot_of[l]].to_vec());
         };
         if curve.closed {
             return knots;
@@ -489,6 +492,20 @@ impl MeshGuide<'_> {
         trimmed.extend(knots.iter().filter(|k| k.s > start && k.s < end));
         trimmed.push(at(end));
         trimmed
+    }
+
+    /// Whether the strip of a pass at a place beyond the border reaches the part.
+    fn serves(&self, p: &MeshPoint) -> bool {
+        let beyond = (p.triangle as usize).checked_sub(self.surface.own_triangles);
+        let (Some(border), Some((allowed, _))) =
+            (beyond.and_then(|t| self.surface.border.get(t)), self.allowed_at(p))
+        else {
+            return false;
+        };
+        // The first corner of such a triangle lies on the border.
+        let [on_border, ..] = self.surface.mesh.corners(p.triangle as usize);
+        let out = p.position - on_border;
+        (out - border * out.dot(border)).norm() <= 0.5 * allowed.width
     }
 
     /// How far a pass that crosses the border at `p` is worth running on, mm; `beyond` is the point

@@ -33,7 +33,7 @@ const DAMPING: f64 = 0.2;
 /// third more.
 const BEND: f64 = 0.3;
 
-/// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
+/// The strip beyond borders counts this share of its area: in the end ψ goes on in it as it comes to them.
 const STRIP_SHARE: f64 = 0.02;
 
 /// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least
@@ -116,6 +116,9 @@ pub(crate) fn shortest_streams(
     let found = parallel::try_map(starts.len(), |k| minimise(starts[k].coefficients.clone(), Rounds::Last))?;
     let mut found: Vec<Packed> = found.into_iter().flatten().collect();
     keep_promising(&mut found, prices.end, |found| found, |_, _| true);
+    for packed in &mut found {
+        packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
+    }
     Ok(found)
 }
 

@@ -370,6 +370,27 @@ impl MeshSurface {
             FieldMesh::new(points, triangles, Some(normals)).map_err(|e| not_applicable(&e.to_string()))?;
         Ok(Self { mesh, bends, corner_normals, own_triangles, origin, border })
     }
+
+    /// A function of the vertices that goes on beyond borders as it comes to them, in the tangent planes.
+    pub fn continued(&self, mut values: Vec<f64>) -> Vec<f64> {
+        let mesh = &self.mesh;
+        // Gradients of the part's triangles, summed by area.
+        let mut around = vec![(Vector3::zeros(), 0.0); values.len()];
+        for (t, corners) in mesh.triangles()[..self.own_triangles].iter().enumerate() {
+            let hats = mesh.hat_gradients(t).into_iter().zip(corners);
+            let gradient: Vector3 = hats.map(|(hat, &v)| hat * values[v as usize]).sum();
+            for &v in corners {
+                around[v as usize].0 += gradient * mesh.area(t);
+                around[v as usize].1 += mesh.area(t);
+            }
+        }
+        for (v, &origin) in self.origin.iter().enumerate().filter(|&(v, &origin)| origin as usize != v) {
+            let (gradient, area) = around[origin as usize];
+            let out = mesh.points()[v] - mesh.points()[origin as usize];
+            values[v] = values[origin as usize] + if area > 0.0 { gradient.dot(&out) / area } else { 0.0 };
+        }
+        values
+    }
 }
 
 pub(crate) fn not_applicable(reason: &str) -> PlanError {
