@@ -234,16 +234,20 @@ impl ChartGuide<'_> {
         if strayed { between } else { q }
     }
 
-    /// The stretches of a run that are worth cutting; `None` without any. What lies outside all along may
-    /// serve the border beside it, where ψ has its greatest value elsewhere.
+    /// The stretches of a curve, or of a run of it, that are worth cutting; `None` without any. A whole curve
+    /// that lies outside all along may serve the border beside it, where ψ has its greatest value elsewhere.
     fn useful_stretches(
         &self,
         at: &dyn Fn(f64) -> [f64; 2],
         [first, end]: [usize; 2],
         closed: bool,
+        is_whole: bool,
     ) -> Option<Vec<Stretch>> {
         let mut stretches = self.stretches(at, first, end);
         if !stretches.iter().any(|s| s.inside) {
+            if !is_whole {
+                return None;
+            }
             let steps = ((end - first) as f64 / OVERRUN_STEP).ceil() as usize;
             let place = |k: usize| first as f64 + (end - first) as f64 * k as f64 / steps as f64;
             let serves = |k: &usize| self.serves(at(place(*k)));
@@ -332,9 +336,12 @@ impl LevelSource for ChartGuide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
+        let is_whole = run.is_none();
         let Some((points, run)) = curve.opened(run) else { return Ok(Vec::new()) };
         let at = |s: f64| self.on_level(&points, level, s);
-        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(Vec::new()) };
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed, is_whole) else {
+            return Ok(Vec::new());
+        };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
         let mut pieces: Vec<Vec<Point3>> = Vec::new();
         for stretch in stretches {
@@ -354,6 +361,7 @@ impl LevelSource for ChartGuide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
+        let is_whole = run.is_none();
         let (Some(rule), Some((points, run))) = (self.settings.axis, curve.opened(run)) else {
             return Ok(None);
         };
@@ -362,7 +370,7 @@ impl LevelSource for ChartGuide<'_> {
             return Ok(None);
         }
         let at = |s: f64| self.on_level(&points, level, s);
-        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed, is_whole) else { return Ok(None) };
         let contact = |s: f64| {
             let [u, v] = at(s);
             let p = self.chart.at(u, v)?;

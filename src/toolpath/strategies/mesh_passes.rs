@@ -643,6 +643,11 @@ impl LevelSource for MeshGuide<'_> {
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let Some((spots, [first, end])) = curve.opened(run) else { return Ok(Vec::new()) };
+        // Beyond the border nothing is asked for but by whole curves that serve it.
+        let own = |spot: &Spot| (spot.at.triangle as usize) < self.surface.own_triangles;
+        if run.is_some() && !spots[first..=end].iter().any(own) {
+            return Ok(Vec::new());
+        }
         let smooth = Smooth { axes: spots.iter().map(|s| s.axis).collect(), closed: curve.closed };
         let mut tip = |s: f64| {
             let at = smooth.at(s).0;
