@@ -370,7 +370,9 @@ impl LevelSource for ChartGuide<'_> {
             return Ok(None);
         }
         let at = |s: f64| self.on_level(&points, level, s);
-        let Some(stretches) = self.useful_stretches(&at, run, curve.closed, is_whole) else { return Ok(None) };
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed, is_whole) else {
+            return Ok(None);
+        };
         let contact = |s: f64| {
             let [u, v] = at(s);
             let p = self.chart.at(u, v)?;
