@@ -15,6 +15,7 @@
 //! where hundreds of flat ends are equal, is then as fast as waves.
 
 mod lowest;
+mod support_area;
 #[cfg(test)]
 mod tests;
 

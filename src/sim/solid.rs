@@ -25,7 +25,7 @@ use motion::ClPoint;
 pub(crate) use moves::MovePart;
 pub use moves::{SweptHit, SweptMoves};
 use search::least;
-pub(crate) use search::{Look, Moving, SHORTEST, Stretch};
+pub(crate) use search::{Look, Moving, SHORTEST, Sample, Stretch};
 pub use turning::Motion;
 
 /// A move turns the axis to its very opposite, so that nobody can tell which way round.

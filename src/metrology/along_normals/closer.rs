@@ -475,9 +475,20 @@ impl NormalInspection<'_> {
             self.sample(p.place.towards(&q.place, 0.5, self.part), p.hit.or(q.hit).as_ref())
         };
         let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-        let parts = [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]];
+        let on = |p: &Sample, q: &Sample| self.on_side(&[*p, *q]);
+        // Those between the middles belong to two triangles each.
+        let [ab_bc, bc_ca, ca_ab] = [on(&ab, &bc), on(&bc, &ca), on(&ca, &ab)];
+        let parts = [
+            ([*a, ab, ca], [&on(a, &ab), &ca_ab, &on(&ca, a)]),
+            ([ab, *b, bc], [&on(&ab, b), &on(b, &bc), &ab_bc]),
+            ([ca, bc, *c], [&bc_ca, &on(&bc, c), &on(c, &ca)]),
+            ([ab, bc, ca], [&ab_bc, &bc_ca, &ca_ab]),
+        ];
         parts
-            .map(|samples| (samples, Closer { middles: [ab, bc, ca], crossings: self.crossings(&samples) }))
+            .map(|(samples, on_sides)| {
+                let crossings = self.crossings(on_sides.into_iter().flatten().copied().collect());
+                (samples, Closer { middles: [ab, bc, ca], crossings })
+            })
             .into()
     }
 }

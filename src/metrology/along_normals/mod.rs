@@ -463,10 +463,8 @@ impl NormalInspection<'_> {
         found
     }
 
-    /// The ridges that cross the sides of a triangle.
-    fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
-        let mut found: Vec<Crossing> =
-            (0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect();
+    /// The ridges of those that cross the sides of a triangle.
+    fn crossings(&self, mut found: Vec<Crossing>) -> Vec<Crossing> {
         found.retain(|crossing| self.is_scallop(crossing));
         with_lengths(found)
     }

@@ -5,8 +5,14 @@
 //! tool turns meanwhile loosens the bound. Wherever a look at the limit falls inside of the tool, the limit
 //! goes down to where the ray enters it at that time (Newton's method on a convex function), and the search
 //! over time goes on from there: it ends when no stretch of time may reach below the limit.
+//!
+//! That takes squares all along a ray that grazes the tool: a pass a radius aside touches the plane of a wall's
+//! normals along a line across s and t. While the axis stands still, D is a convex function of both together,
+//! and every look supports it everywhere. So where a search is long, the rest is sought in the polygon that
+//! such supports leave.
 
-use crate::solid::{Look, Motion, MovePart, Moving, SHORTEST, Stretch, SweptMoves};
+use super::support_area::SupportArea;
+use crate::solid::{Look, Motion, MovePart, Moving, SHORTEST, Sample, Stretch, SweptMoves};
 use cutter::Solid;
 use geometry::{Point3, Vector3};
 
@@ -25,6 +31,10 @@ const MAX_STEPS: usize = 60;
 
 /// Ranges of the ray shorter than this, mm, are not divided.
 const SHORTEST_RANGE: f64 = 1e-10;
+
+/// A search is long when it has looked at more stretches, with a few looks each: a polygon takes some dozens of
+/// looks, so that both together take no more than about twice as long as the quicker one.
+const LONG: usize = 16;
 
 /// Stretches that wait at once, but for odd moves.
 const USUALLY: usize = 16;
@@ -140,6 +150,8 @@ struct Search<'a, M> {
     at: f64,
     /// How many times as far from the origin the ray begins as [`NEAR_ORIGIN`]; no less than 1.
     far: f64,
+    /// Whether the distance is convex in place and time together.
+    convex: bool,
 }
 
 impl<'a, M: Moving> Search<'a, M> {
@@ -147,7 +159,8 @@ impl<'a, M: Moving> Search<'a, M> {
         let ends = [ray.low, limit].map(|s| moving.bends(&ray.at(s), range));
         let bends = [0, 1].map(|k| ends[0][k].max(ends[1][k]));
         let far = (ray.point.coords.amax() / NEAR_ORIGIN).max(1.0);
-        Self { ray, moving, range, bends, limit, at: f64::NAN, far }
+        let convex = moving.turn() == 0.0 && bends == [0.0; 2];
+        Self { ray, moving, range, bends, limit, at: f64::NAN, far, convex }
     }
 
     #[inline(always)]
@@ -182,7 +195,13 @@ impl<'a, M: Moving> Search<'a, M> {
         let mut open = Vec::with_capacity(USUALLY);
         open.push(Open { a, b: middle, low, top, quick: true });
         open.push(Open { a: middle, b, low, top, quick: true });
+        let mut divided = 0;
         while let Some(stretch) = open.pop() {
+            divided += 1;
+            if self.convex && divided > LONG {
+                self.by_area();
+                break;
+            }
             self.divide(&stretch, &mut open);
         }
         (!self.at.is_nan()).then_some((self.limit, self.at))
@@ -232,6 +251,29 @@ impl<'a, M: Moving> Search<'a, M> {
         waiting.extend(if sample.slope > 0.0 { [right, left] } else { [left, right] });
     }
 
+    /// Leaves no place below the limit that is deeper in the tool than the tolerance, where the distance is
+    /// convex. Each look from the middle of what is left takes a third of it or more; one from its lowest corner
+    /// ends the search where the tool begins there. What lies deeper makes a circle, or a quarter of one, so that
+    /// a hundred looks or so see it or prove that there is none.
+    fn by_area(&mut self) {
+        // One half of what may be missed is left to the looks, the other to the rest of the area. With this
+        // scale of time the distance grows by no more than √2 times the way, and a quarter of a circle holds
+        // one with 0.41 times its radius.
+        let tolerance = 0.5 * self.far * TOLERANCE;
+        let mut area = SupportArea::new([self.ray.low, self.limit], self.range, self.moving.pace().max(1.0));
+        while let Some(middle) = area.middle(0.25 * tolerance) {
+            for [s, t] in [Some(middle), area.lowest()].into_iter().flatten() {
+                let mut seen = self.look(s, t);
+                if seen.look.sample.value <= -tolerance {
+                    seen = self.enter(seen);
+                    area.keep([self.limit, t], 0.0, [1.0, 0.0]);
+                }
+                let Sample { t, value, slope, .. } = seen.look.sample;
+                area.keep([seen.s, t], value + tolerance, [seen.rise, slope]);
+            }
+        }
+    }
+
     /// From a look that falls inside of the tool down the ray to where that begins, which is the limit from
     /// then on; other looks stay as they are.
     ///
@@ -278,5 +320,70 @@ impl Seen {
         sample.slope -= side * turn * by.abs();
         seen.s = s;
         seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cutter::Cutter;
+    use motion::ClPoint;
+    use std::cell::Cell;
+
+    /// Counts the looks at a solid on its way.
+    struct Counted<'a, M>(M, &'a Cell<usize>);
+
+    impl<M: Moving> Moving for Counted<'_, M> {
+        fn look(&self, q: &Point3, t: f64) -> Look {
+            self.1.set(self.1.get() + 1);
+            self.0.look(q, t)
+        }
+
+        fn bends(&self, q: &Point3, range: [f64; 2]) -> [f64; 2] {
+            self.0.bends(q, range)
+        }
+
+        fn turn(&self) -> f64 {
+            self.0.turn()
+        }
+
+        fn pace(&self) -> f64 {
+            self.0.pace()
+        }
+    }
+
+    /// A pass that runs `aside` mm beside a level ray, up to its height or higher: a ball of 6 mm with its
+    /// shank. What the ray meets, and how many looks that takes.
+    fn beside(aside: f64, rise: f64, high: f64) -> (Option<f64>, usize) {
+        let solid = Solid::of_cutter(&Cutter::ball(6.0).unwrap(), None);
+        let at = |x: f64, z: f64| ClPoint::upright(Point3::new(x, aside, z));
+        let motion = Motion::new(&at(-4.0, 0.0), &at(-7.0, rise)).unwrap();
+        let ray = Ray { point: Point3::new(0.0, 0.0, 4.0), normal: -Vector3::x(), low: -0.1, high };
+        let looks = Cell::new(0);
+        let search = Search::new(&ray, Counted(motion.piece(&solid, 0), &looks), [0.0, 1.0], high);
+        let found = search.run().map(|(s, _)| s);
+        (found, looks.get())
+    }
+
+    /// A pass a radius aside touches the ray wherever it stands, and no look tells one place of the other.
+    #[test]
+    fn a_ray_that_grazes_a_pass_is_answered_in_few_looks() {
+        const MANY: usize = 1_000;
+        for rise in [0.0, 0.5] {
+            for high in [3.0, 24.0] {
+                for aside in [3.0, 3.0 - 1e-9, 3.0 + 1e-9, 3.0 - 1e-6, 2.999, 3.001, 1.0] {
+                    let (found, looks) = beside(aside, rise, high);
+                    let far = 4.0 - (9.0f64 - aside * aside).max(0.0).sqrt();
+                    let name = format!("{aside} {rise} {high}: {found:?} {far} {looks}");
+                    assert!(looks < MANY, "{name}");
+                    if (aside - 3.0).abs() > 1e-10 {
+                        assert_eq!(found.is_some(), aside < 3.0 && far < high, "{name}");
+                    }
+                    // Right to 1e-9 mm over the sine.
+                    let sine = (9.0 - aside * aside).max(1e-18).sqrt() / 3.0;
+                    assert!(found.is_none_or(|s| (s - far).abs() < 1e-9 / sine), "{name}");
+                }
+            }
+        }
     }
 }

@@ -49,6 +49,9 @@ pub(crate) trait Moving {
 
     /// How fast its directions turn, rad for the whole move.
     fn turn(&self) -> f64;
+
+    /// How far places of it move at most while its axis stands still, mm for the whole move.
+    fn pace(&self) -> f64;
 }
 
 /// A stretch between two samples.

@@ -131,6 +131,10 @@ impl Moving for MovingPiece<'_> {
     fn turn(&self) -> f64 {
         self.motion.turn
     }
+
+    fn pace(&self) -> f64 {
+        self.motion.way.norm()
+    }
 }
 
 /// A ball whose middle runs along with the tool: `tip + r·axis`. How its axis turns is of no account.
@@ -162,5 +166,9 @@ impl Moving for MovingBall<'_> {
 
     fn turn(&self) -> f64 {
         0.0
+    }
+
+    fn pace(&self) -> f64 {
+        self.motion.way.norm()
     }
 }
