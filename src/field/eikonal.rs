@@ -24,6 +24,7 @@ mod front;
 mod tests;
 
 pub use front::Front;
+pub(crate) use front::Window;
 
 use super::GridField;
 use work::monitor::{self, Cancelled, Monitor};
@@ -129,6 +130,7 @@ pub fn eikonal(
         origin: [domain[0][0], domain[1][0]],
         pitch,
         nodes,
+        steepest: work::parallel::map(fronts.len(), |k| fronts[k].steepest()),
         fronts,
         value: vec![f64::INFINITY; nu * nv],
         first: Vec::new(),
@@ -200,6 +202,8 @@ struct Sweeper {
     pitch: [f64; 2],
     nodes: [usize; 2],
     fronts: Vec<Front>,
+    /// [`Front::steepest`] of each.
+    steepest: Vec<[f64; 2]>,
     /// |φ|.
     value: Vec<f64>,
     /// |φ| of the first order.
@@ -434,7 +438,7 @@ impl Sweeper {
             // Fronts from two sides of the start do not add up.
             [0, 1].map(|c| if c == earlier { value[c] } else { f64::INFINITY })
         };
-        (self.fronts[k].arrival(self.pitch, toward, known), side[earlier])
+        (self.fronts[k].arrival(self.steepest[k], self.pitch, toward, known), side[earlier])
     }
 
     /// Arrival by one-sided differences of second order, and the choice (quadrant and neighbours) that it is
@@ -450,8 +454,8 @@ impl Sweeper {
             for by in [By::Both, By::U, By::V].into_iter().filter(|by| chosen.is_none_or(|c| c.by == *by)) {
                 let value = match by {
                     By::Both => self.fronts[k].through_both(pitch, toward, values, chosen.is_none()),
-                    By::U => Some(values[0] + pitch[0] * self.fronts[k].steepest[0]),
-                    By::V => Some(values[1] + pitch[1] * self.fronts[k].steepest[1]),
+                    By::U => Some(values[0] + pitch[0] * self.steepest[k][0]),
+                    By::V => Some(values[1] + pitch[1] * self.steepest[k][1]),
                 };
                 if let Some(value) = value.filter(|value| *value < best.0) {
                     best = (value, Some(Choice { quadrant: quadrant as u8, by }));
@@ -465,7 +469,7 @@ impl Sweeper {
     /// order; of the neighbour itself where a kink or the border is near.
     fn one_sided(&self, k: usize, axis: usize, toward: f64) -> (f64, f64) {
         let (here, pitch) = (self.first[k], self.pitch[axis]);
-        let close = pitch * self.fronts[k].steepest[axis];
+        let close = pitch * self.steepest[k][axis];
         let seen = |steps: isize, values: &[f64]| {
             let n = self.behind(k, axis, toward, steps)?;
             let value = values[n];

@@ -32,7 +32,7 @@
 //! A local minimum: [`minimise`] is called from several starts. Sites see what lies between them by their
 //! area only.
 
-use super::eikonal::Front;
+use super::eikonal::{Front, Window};
 use super::sparse::{Entry, Factor};
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
@@ -333,11 +333,11 @@ impl Site {
 
     /// What a gradient costs with the penalty and a price of each end at a border, and the derivatives of
     /// that by its components.
-    fn charge(&self, q: [f64; 2], penalty: f64, end: f64) -> (f64, [f64; 2]) {
+    fn charge(&self, q: [f64; 2], penalty: f64, end: f64, window: &mut Window) -> (f64, [f64; 2]) {
         let norm2 = (q[0] * q[0] + q[1] * q[1]).max(f64::MIN_POSITIVE);
         let norm = norm2.sqrt();
         let (cost, cost_turn) = self.cost_at(q, norm2);
-        let (square, square_turn) = self.front.square(q);
+        let (square, square_turn) = self.front.square_near(q, window);
         let slow = square.max(f64::MIN_POSITIVE).sqrt();
         let short = slow / norm - 1.0;
         // By the length of q and by its angle.
@@ -366,22 +366,30 @@ struct Problem<'a> {
     end: f64,
 }
 
+/// What the last look at a site found.
+#[derive(Debug, Clone, Copy, Default)]
+struct Look {
+    window: Window,
+    value: f64,
+    slope: [f64; 2],
+}
+
 /// Sites that one worker looks at.
 const SITES_A_PIECE: usize = 2048;
 
 impl Problem<'_> {
-    /// What ψ costs, and the derivatives of that by its coefficients.
-    fn charge(&self, x: &[f64], penalty: f64, by: &mut [f64]) -> f64 {
-        let pieces = parallel::map(self.sites.len().div_ceil(SITES_A_PIECE), |piece| {
-            let first = piece * SITES_A_PIECE;
-            let sites = &self.sites[first..(first + SITES_A_PIECE).min(self.sites.len())];
-            let charge =
-                |(k, site): (usize, &Site)| site.charge(self.gradients.at(first + k, x), penalty, self.end);
-            sites.iter().enumerate().map(charge).collect::<Vec<_>>()
+    /// What ψ costs, and the derivatives of that by its coefficients; `looks` are those at the sites.
+    fn charge(&self, x: &[f64], penalty: f64, by: &mut [f64], looks: &mut [Look]) -> f64 {
+        parallel::for_each_chunk(looks, SITES_A_PIECE, |piece, looks| {
+            for (k, look) in looks.iter_mut().enumerate() {
+                let k = piece * SITES_A_PIECE + k;
+                let q = self.gradients.at(k, x);
+                (look.value, look.slope) = self.sites[k].charge(q, penalty, self.end, &mut look.window);
+            }
         });
         by.fill(0.0);
         let mut sum = 0.0;
-        for (site, (value, slope)) in pieces.into_iter().flatten().enumerate() {
+        for (site, Look { value, slope, .. }) in looks.iter().enumerate() {
             sum += value;
             for &(k, share) in self.gradients.of(site) {
                 by[k as usize] += slope[0] * share[0] + slope[1] * share[1];
@@ -435,7 +443,8 @@ impl Problem<'_> {
     ) -> Result<(), Cancelled> {
         let n = x.len();
         let mut slope = vec![0.0; n];
-        let mut value = self.charge(x, penalty, &mut slope);
+        let mut looks = vec![Look::default(); self.sites.len()];
+        let mut value = self.charge(x, penalty, &mut slope, &mut looks);
         // Steps and changes of the slope.
         let mut memory: std::collections::VecDeque<[Vec<f64>; 2]> = std::collections::VecDeque::new();
         let mut settled = 0;
@@ -476,7 +485,7 @@ impl Problem<'_> {
             for _ in 0..MOST_HALVINGS {
                 let mut to = x.clone();
                 add(&mut to, &direction, size);
-                let there = self.charge(&to, penalty, &mut by);
+                let there = self.charge(&to, penalty, &mut by, &mut looks);
                 if there <= value + LEAST_GAIN * size * promised {
                     found = Some((to, there));
                     break;
@@ -722,13 +731,14 @@ mod tests {
             // The second derivative jumps where the interval is the allowed one.
             let (_, short) = site.length_and_shortfall(q);
             prop_assume!(short.abs() > 1e-3);
-            let (_, by) = site.charge(q, 30.0, 0.7);
+            let charge = |q: [f64; 2]| site.charge(q, 30.0, 0.7, &mut Window::default());
+            let (_, by) = charge(q);
             for c in 0..2 {
                 let h = 1e-6;
                 let at = |s: f64| {
                     let mut moved = q;
                     moved[c] += s * h;
-                    site.charge(moved, 30.0, 0.7).0
+                    charge(moved).0
                 };
                 let numeric = (at(1.0) - at(-1.0)) / (2.0 * h);
                 prop_assert!((numeric - by[c]).abs() < 1e-4 * (1.0 + by[c].abs()), "{numeric} {}", by[c]);

@@ -26,6 +26,21 @@ const ROOT: f64 = 1e-13;
 /// Bisection and Newton steps for one arrival; bisection alone is exact after some fifty.
 const MOST_STEPS: usize = 60;
 
+/// The entries of a table around a direction. Minimisers turn it little from step to step, and tables of many
+/// places lie far apart in memory.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Window {
+    /// The direction before it.
+    from: usize,
+    entries: [f64; 4],
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self { from: usize::MAX, entries: [0.0; 4] }
+    }
+}
+
 /// The speed of fronts at a place, by direction.
 #[derive(Debug, Clone)]
 pub struct Front {
@@ -41,9 +56,6 @@ pub struct Front {
     /// Bounds of s².
     least: f64,
     greatest: f64,
-    /// Greatest φ_u and φ_v of any front: φ by which the neighbour along an axis is later at most, over the
-    /// distance.
-    pub(super) steepest: [f64; 2],
 }
 
 impl Front {
@@ -106,10 +118,13 @@ impl Front {
             (bounds[0] * (1.0 - BETWEEN_DIRECTIONS), bounds[1] * (1.0 + BETWEEN_DIRECTIONS))
         };
         let table = (!harmonic).then(|| Box::new(rest));
-        let mut front =
-            Self { frame, mean, cosine, sine, fourth, table, least, greatest, steepest: [0.0; 2] };
-        front.steepest = [front.latest([1.0, 0.0]), front.latest([0.0, 1.0])];
-        front
+        Self { frame, mean, cosine, sine, fourth, table, least, greatest }
+    }
+
+    /// Greatest φ_u and φ_v of any front: φ by which the neighbour along an axis is later at most, over the
+    /// distance.
+    pub(super) fn steepest(&self) -> [f64; 2] {
+        [self.latest([1.0, 0.0]), self.latest([0.0, 1.0])]
     }
 
     /// Components of a gradient in the orthonormal frame, from its derivatives by the parameters.
@@ -129,7 +144,12 @@ impl Front {
     }
 
     /// s² of the direction of `q`, and its derivative by the angle.
-    pub fn square(&self, [q1, q2]: [f64; 2]) -> (f64, f64) {
+    pub fn square(&self, q: [f64; 2]) -> (f64, f64) {
+        self.square_near(q, &mut Window::default())
+    }
+
+    /// The same, with the entries of the table that were asked for last at this place.
+    pub(crate) fn square_near(&self, [q1, q2]: [f64; 2], window: &mut Window) -> (f64, f64) {
         let norm2 = q1 * q1 + q2 * q2;
         let (cos, sin) =
             if norm2 > 0.0 { ((q1 * q1 - q2 * q2) / norm2, 2.0 * q1 * q2 / norm2) } else { (1.0, 0.0) };
@@ -141,7 +161,11 @@ impl Front {
         let per_angle = DIRECTIONS as f64 / std::f64::consts::PI;
         let x = (q2.atan2(q1) * per_angle).rem_euclid(DIRECTIONS as f64);
         let (k, t) = (x as usize, x.fract());
-        let [a, b, c, d] = [k + DIRECTIONS - 1, k, k + 1, k + 2].map(|k| table[k % DIRECTIONS]);
+        if window.from != k {
+            let entries = [k + DIRECTIONS - 1, k, k + 1, k + 2].map(|k| table[k % DIRECTIONS]);
+            *window = Window { from: k, entries };
+        }
+        let [a, b, c, d] = window.entries;
         let (s1, s2) = (0.5 * (c - a), 0.5 * (d - b));
         let (c2, c3) = (3.0 * (c - b) - 2.0 * s1 - s2, 2.0 * (b - c) + s1 + s2);
         let rest = b + t * (s1 + t * (c2 + t * c3));
@@ -199,9 +223,16 @@ impl Front {
 
     /// φ at a node from its neighbours at distances `pitch` along u and along v, on the sides `toward` (±1:
     /// the front moves along or against the parameter), where it has the values `known`. The smallest of the
-    /// front through both and of those along one; infinite when nothing is known.
-    pub(super) fn arrival(&self, pitch: [f64; 2], toward: [f64; 2], known: [f64; 2]) -> f64 {
-        let alone = [0, 1].map(|c| known[c] + pitch[c] * self.steepest[c]);
+    /// front through both and of those along one, which are [`Front::steepest`]; infinite when nothing is
+    /// known.
+    pub(super) fn arrival(
+        &self,
+        steepest: [f64; 2],
+        pitch: [f64; 2],
+        toward: [f64; 2],
+        known: [f64; 2],
+    ) -> f64 {
+        let alone = [0, 1].map(|c| known[c] + pitch[c] * steepest[c]);
         let alone = alone[0].min(alone[1]);
         match self.through_both(pitch, toward, known, true) {
             Some(both) => both.min(alone),

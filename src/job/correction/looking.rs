@@ -87,18 +87,38 @@ impl Session {
         monitor: &dyn Monitor,
     ) -> Result<Option<RidgeMap>, JobError> {
         monitor.start("measuring the ridges of a plan", 0);
-        self.on_coarse_cells(request, planned, |task| engine.ridges(task, monitor))
+        let mut found = None;
+        // Where faces are steep, passes lie nearer to each other in the plan view.
+        for share in if engine.gains_by_cells() { &[1.0, 0.5][..] } else { &[1.0] } {
+            let ridges = |task: &Task<'_>| engine.ridges(task, monitor);
+            found = self.on_share_cells(request, planned, share / CELLS_A_PASS, ridges)?;
+            if found.is_some() {
+                break;
+            }
+        }
+        Ok(found)
     }
 
-    /// Cells that are just fine enough to show every pass of a plan.
+    /// Cells that are just fine enough to show every pass of a plan on level ground.
     pub(super) fn on_coarse_cells<T>(
         &self,
         request: &ToolpathRequest,
         planned: &Planned,
         of_task: impl FnOnce(&Task<'_>) -> Result<T, EngineError>,
     ) -> Result<T, JobError> {
+        self.on_share_cells(request, planned, 1.0 / CELLS_A_PASS, of_task)
+    }
+
+    /// Cells of a share of the interval of passes on level ground.
+    fn on_share_cells<T>(
+        &self,
+        request: &ToolpathRequest,
+        planned: &Planned,
+        share: f64,
+        of_task: impl FnOnce(&Task<'_>) -> Result<T, EngineError>,
+    ) -> Result<T, JobError> {
         let scene = &self.scene;
-        let cell = plane_interval(&request.tooling.cutter, request.step) / CELLS_A_PASS;
+        let cell = share * plane_interval(&request.tooling.cutter, request.step);
         let simulation = Simulation { cell, cell_is_auto: true, ..scene.simulation };
         let cells =
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;

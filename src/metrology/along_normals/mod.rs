@@ -245,7 +245,9 @@ pub(crate) fn ridges_along_normals(
     let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: 0 };
     let net = Net::over(part, spacing);
     let kept = are_judged(&net.places, Some((&task.facing(), task.judged)));
-    along.ridges(&net, &kept, monitor)
+    let is_kept = |t: &[u32; 3]| t.iter().all(|&k| kept[k as usize]);
+    let net = Net::of_triangles(&net.places, net.triangles.iter().copied().filter(is_kept));
+    along.ridges(&net, monitor)
 }
 
 /// Which places are judged.

@@ -132,6 +132,22 @@ impl Net {
         net
     }
 
+    /// Some triangles of places, without the places that none of them has.
+    pub fn of_triangles(all: &[NetPlace], triangles: impl Iterator<Item = [u32; 3]>) -> Self {
+        let mut index = vec![u32::MAX; all.len()];
+        let mut places = Vec::new();
+        let mut number = |k: u32| {
+            let at = &mut index[k as usize];
+            if *at == u32::MAX {
+                *at = places.len() as u32;
+                places.push(all[k as usize]);
+            }
+            *at
+        };
+        let triangles = triangles.map(|t| t.map(&mut number)).collect();
+        Self { places, triangles, grids: Vec::new() }
+    }
+
     fn add_patch(&mut self, part: &Part, k: usize, spacing: f64) {
         let (steps, pitch) = steps(part, k, spacing);
         let domain = part.patches()[k].domain();

@@ -10,21 +10,17 @@ use crate::tracks::Tracks;
 use work::monitor::{Cancelled, Monitor};
 
 impl Along<'_> {
-    /// The ridges between the places of a net that are `kept`, and the remnants along their border.
+    /// The ridges between the places of a net, and the remnants along its border.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
-    pub(crate) fn ridges(
-        &self,
-        net: &Net,
-        kept: &[bool],
-        monitor: &dyn Monitor,
-    ) -> Result<RidgeMap, Cancelled> {
+    pub(crate) fn ridges(&self, net: &Net, monitor: &dyn Monitor) -> Result<RidgeMap, Cancelled> {
         let limits = self.limits;
         let tracks = Tracks::new(self.path, self.cutters);
         let mut inspection = self.inspection(&tracks);
         inspection.finder.close = NEARLY;
-        let Seen { samples, triangles, of_triangle, on_border } = inspection.look(net, kept, monitor)?;
+        let Seen { samples, triangles, of_triangle, on_border } =
+            inspection.look(net, &vec![true; net.places.len()], monitor)?;
         // Those that are too tall for scallops count as well: plans are corrected by them.
         let of_triangle = Grouped::of(of_triangle);
         let mut greatest = Greatest::default();

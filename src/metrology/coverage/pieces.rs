@@ -57,7 +57,7 @@ impl Pieces {
     pub fn chosen(self, chosen: impl Fn(usize) -> bool) -> Net {
         let Net { places, triangles, .. } = self.net;
         let triangles = triangles.into_iter().enumerate().filter(|(t, _)| chosen(*t)).map(|(_, t)| t);
-        compact(&places, triangles.collect())
+        Net::of_triangles(&places, triangles)
     }
 }
 
@@ -106,22 +106,6 @@ pub(super) fn divided(part: &Part, mut net: Net, spacing: f64) -> Net {
         open.extend([[middle, b, c], [a, middle, c]]);
     }
     net
-}
-
-/// A net of some triangles, without the places that none of them has.
-fn compact(all: &[NetPlace], triangles: Vec<[u32; 3]>) -> Net {
-    let mut index = vec![u32::MAX; all.len()];
-    let mut places = Vec::new();
-    let mut number = |k: u32| {
-        let at = &mut index[k as usize];
-        if *at == u32::MAX {
-            *at = places.len() as u32;
-            places.push(all[k as usize]);
-        }
-        *at
-    };
-    let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
-    Net { places, triangles, grids: Vec::new() }
 }
 
 /// Area of a triangle between its corners, mm².

@@ -5,11 +5,15 @@ use std::time::Instant;
 use sim::{CutHeights, ZMap, cut, cut_in_turn, cut_reference};
 use work::monitor::Monitor;
 
-use super::normals::RAYS;
+use super::normals::{RAYS, ridge_places};
 use super::{Engine, EngineError, Measured, Task, View};
 use crate::measure::measure_with_walls;
 use crate::ridge_map::{places_above, ridge_map};
 use crate::{Asked, RidgeMap, RidgePlace};
+
+/// Places along normals that tell the ridges for each cell that could not, at most: with more of them it takes
+/// no longer to measure all. Smooth parts have a quarter.
+const PLACES_A_CELL: f64 = 0.5;
 
 /// An engine on cells.
 pub(super) struct Cells {
@@ -64,10 +68,12 @@ impl Engine for Cells {
         let (cut, _) = self.cut(task, monitor)?;
         let asked = task.simulation.error_bound;
         let found = ridge_map(task.part, task.cutters, task.path, &cut, task.limits, asked, monitor)?;
+        let most_places = PLACES_A_CELL * cut.grid.len() as f64;
         drop(cut);
         // Places along the normals may be as coarse: each sees every move.
+        let by_rays = || !task.cutters.are_several() && !task.pocket && ridge_places(task) <= most_places;
         match found {
-            None if !task.cutters.are_several() && !task.pocket => RAYS.ridges(task, monitor),
+            None if by_rays() => RAYS.ridges(task, monitor),
             found => Ok(found),
         }
     }

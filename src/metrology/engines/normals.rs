@@ -77,8 +77,7 @@ impl Engine for Normals {
         if !self.finds_ridges() {
             return Ok(None);
         }
-        let widest = task.part.bounds().size().norm();
-        let spacing = task.simulation.cell.max((mean_interval(task) / PLACES_A_PASS).min(widest));
+        let spacing = ridge_spacing(task);
         let solid = Solid::of_cutter(task.cutters.first(), task.holder);
         // Measuring may still fit into the memory; where it does not, it says so.
         let budget = task.budget.without(Rays::bytes(task.path, &solid));
@@ -130,6 +129,17 @@ impl Engine for Normals {
             note: None,
         })
     }
+}
+
+/// Distance of the places that show ridges, mm.
+fn ridge_spacing(task: &Task<'_>) -> f64 {
+    let widest = task.part.bounds().size().norm();
+    task.simulation.cell.max((mean_interval(task) / PLACES_A_PASS).min(widest))
+}
+
+/// How many places show the ridges of a path: on a mesh each facet has its own.
+pub(super) fn ridge_places(task: &Task<'_>) -> f64 {
+    net_places(task.part, ridge_spacing(task))
 }
 
 /// The part's surface over the length that is cut, mm.
