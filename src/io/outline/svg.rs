@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 use roxmltree::{Document, Node};
 use svgtypes::{PathParser, PathSegment, PointsParser};
 
-use page::{Map, map_of, transformed, user};
+use page::{Map, map_of, radius, transformed, user};
 use style::{MARKERS, Pens, check_sheet, check_style, is_any, is_displayed, is_usual, keyword, property_of};
 
 use super::{Chords, Drawn, OutlineError, OutlineFormat, OutlineOptions};
@@ -311,9 +311,10 @@ impl Reader<'_> {
             "ellipse" => round(or("cx", 0.0)?, or("cy", 0.0)?, positive("rx")?, positive("ry")?),
             "rect" => {
                 let (x, y, w, h) = (or("x", 0.0)?, or("y", 0.0)?, positive("width")?, positive("height")?);
-                let (rx, ry) = (user(node, "rx")?, user(node, "ry")?);
-                let rx0 = rx.or(ry).unwrap_or(0.0).clamp(0.0, 0.5 * w);
-                let ry0 = ry.or(rx).unwrap_or(0.0).clamp(0.0, 0.5 * h);
+                let (rx, ry) = (radius(node, "rx")?, radius(node, "ry")?);
+                let radii = [rx.or(ry).unwrap_or(0.0).min(0.5 * w), ry.or(rx).unwrap_or(0.0).min(0.5 * h)];
+                // Without one of the two a corner is square.
+                let [rx0, ry0] = if radii.contains(&0.0) { [0.0; 2] } else { radii };
                 let mut chords = Chords::closed(Vec::new());
                 let corners = [
                     (x + w - rx0, y + ry0, -0.25),
@@ -325,7 +326,7 @@ impl Reader<'_> {
                     let (from, to) = (from * TAU, (from + 0.25) * TAU);
                     let axes = [map.x * rx0, map.y * ry0];
                     chords.points.push(map.at(cx, cy) + axes[0] * from.cos() + axes[1] * from.sin());
-                    if rx0 > 0.0 && ry0 > 0.0 {
+                    if rx0 > 0.0 {
                         chords.ellipse(map.at(cx, cy), axes, from, to, self.tolerance);
                     }
                 }

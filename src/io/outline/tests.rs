@@ -103,6 +103,20 @@ fn every_kind_of_svg_element_has_the_area_of_its_closed_form() {
     assert_eq!(flipped, [Point2::new(0.0, 40.0), Point2::new(5.0, 50.0)], "y runs up from the lower edge");
 }
 
+/// Corners of a rect follow SVG 2: a radius of 0 squares them whatever the other one is, and one that is
+/// negative or `auto` is the other one.
+#[test]
+fn corners_of_a_rect_have_the_radii_that_svg_says() {
+    let square = |also: &str, area: f64| near(svg(&format!("<rect width='80' height='60' {also}/>")), area);
+    for also in ["rx='0' ry='20'", "rx='20' ry='0'", "rx='-4' ry='-4'", "rx='auto' ry='-1'"] {
+        square(also, 1200.0);
+    }
+    for also in ["rx='-4' ry='20'", "rx=' auto ' ry='20'", "rx='20' ry='-4'", "ry='20'"] {
+        square(also, 1200.0 - (4.0 - PI) * 100.0);
+    }
+    square("rx='60' ry='20'", 1200.0 - (4.0 - PI) * 200.0);
+}
+
 #[test]
 fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";

@@ -54,6 +54,15 @@ pub(super) fn user(node: &Node<'_, '_>, name: &str) -> Result<Option<f64>, Outli
     }
 }
 
+/// A radius of the corners of a rect; `None` where it is that of the other axis: not stated, `auto`, or
+/// negative, which does not count (SVG 2, 7.4).
+pub(super) fn radius(node: &Node<'_, '_>, name: &str) -> Result<Option<f64>, OutlineError> {
+    if node.attribute(name).is_some_and(|text| text.trim() == "auto") {
+        return Ok(None);
+    }
+    Ok(user(node, name)?.filter(|radius| *radius >= 0.0))
+}
+
 /// From the drawing's own coordinates to mm, y up.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Map {
