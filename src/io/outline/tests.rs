@@ -331,6 +331,58 @@ fn what_a_dxf_hides_is_left_out() {
     assert!(none.contains("no outlines; invisible entities, left out: 1"), "{none}");
 }
 
+/// What a block holds is on its own layers, and on layer 0 it is on that of the INSERT: an INSERT of any
+/// layer is refused where its block shows something on the wanted one, and left out where not.
+#[test]
+fn blocks_are_refused_by_what_they_hold_on_the_wanted_layer() {
+    let circle = |layer: &str| format!("0 CIRCLE 8 {layer} 10 0 20 0 40 3");
+    let block = |name: &str, holds: &str| format!("0 BLOCK 8 0 2 {name} 70 0 {holds} 0 ENDBLK 8 0");
+    let blocks = [
+        block("boss", &circle("cut")),
+        block("plain", &circle("0")),
+        block("other", &circle("marks")),
+        block("outer", "0 INSERT 8 0 2 BOSS 0 INSERT 8 marks 2 Outer"),
+        block("carrier", "0 INSERT 8 0 2 plain"),
+        block("unseen", "0 CIRCLE 8 cut 60 1 10 0 20 0 40 3"),
+    ];
+    let read = |insert: &str| {
+        let entities = format!("0 LWPOLYLINE 8 cut {SQUARE} {insert}");
+        let text = with_layers(&entities);
+        let blocks = format!("0\nSECTION\n2\nBLOCKS\n{}\n0\nENDSEC\n", blocks.join(" ").replace(' ', "\n"));
+        parse(
+            (blocks + &text).as_bytes(),
+            dxf::FORMAT,
+            &OutlineOptions { layer: Some("cut".into()), ..options() },
+        )
+    };
+    for insert in [
+        "8 0 2 boss",
+        "8 marks 2 BOSS",
+        "8 off 2 boss",
+        "8 0 2 outer",
+        "8 cut 2 plain",
+        "8 cut 2 carrier",
+        "8 cut 2 missing",
+    ] {
+        let refused = read(&format!("0 INSERT {insert}")).unwrap_err().to_string();
+        assert!(refused.contains("INSERT") && refused.contains("explode"), "{insert}: {refused}");
+    }
+    for insert in [
+        "8 0 2 plain",
+        "8 cut 2 other",
+        "8 marks 2 carrier",
+        "8 0 2 unseen",
+        "8 Frozen 2 boss",
+        "8 0 60 1 2 boss",
+        "8 0 67 1 2 boss",
+        "8 0 2 missing",
+    ] {
+        assert_eq!(read(&format!("0 INSERT {insert}")).unwrap().region.area(), 100.0, "{insert}");
+    }
+    let refused = read("0 INSERT 8 0 2 outer").unwrap_err().to_string();
+    assert!(refused.contains("has CIRCLE (line 13) on the layer \"cut\""), "{refused}");
+}
+
 #[test]
 fn outlines_that_are_not_level_are_refused_or_told() {
     for entity in [
