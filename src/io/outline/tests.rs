@@ -117,6 +117,42 @@ fn corners_of_a_rect_have_the_radii_that_svg_says() {
     square("rx='60' ry='20'", 1200.0 - (4.0 - PI) * 200.0);
 }
 
+/// Where width and height scale the viewBox differently, its `preserveAspectRatio` says what holds: one unit
+/// is a millimetre in x and more, or less, in y.
+#[test]
+fn the_aspect_ratio_of_a_page_is_kept_as_svg_says() {
+    let read = |size: [&str; 2], also: &str| {
+        let text = format!(
+            "<svg width='{}mm' height='{}mm' viewBox='10 0 100 50' {also}><rect x='10' width='100' height='50'/></svg>",
+            size[0], size[1]
+        );
+        parse(text.as_bytes(), svg::FORMAT, &options())
+    };
+    let is = |size: [&str; 2], also: &str, lo: [f64; 2], hi: [f64; 2], noted: bool| {
+        let found = read(size, also).unwrap();
+        let bounds = found.region.bounds().unwrap();
+        for (found, wanted) in bounds.iter().zip([lo, hi]) {
+            assert!((found - Point2::from(wanted)).norm() < 1e-9, "{size:?} {also}: {bounds:?}");
+        }
+        assert_eq!(found.notes.join("").contains("preserveAspectRatio"), noted, "{also}: {:?}", found.notes);
+    };
+    is(["100", "50"], "preserveAspectRatio='xMidYMid slice'", [0.0, 0.0], [100.0, 50.0], false);
+    is(["100.09", "50"], "", [0.045, 0.0], [100.045, 50.0], true);
+    is(["100", "60"], "preserveAspectRatio='xMidYMid meet'", [0.0, 5.0], [100.0, 55.0], true);
+    // y runs up: the upper edges meet with YMin, the lower ones with YMax.
+    is(["100", "60"], "preserveAspectRatio='xMaxYMin'", [0.0, 10.0], [100.0, 60.0], true);
+    is(["100", "60"], "preserveAspectRatio='xMinYMax'", [0.0, 0.0], [100.0, 50.0], true);
+    is(["120", "50"], "preserveAspectRatio='xMaxYMid'", [20.0, 0.0], [120.0, 50.0], true);
+    is(["100", "60"], "preserveAspectRatio='none'", [0.0, 0.0], [100.0, 60.0], true);
+    // Rounded to the last decimal that is written: less than a micrometre over the page.
+    is(["100.0000004", "50"], "", [0.0000002, 0.0], [100.0000002, 50.0], false);
+    for (also, word) in [("preserveAspectRatio='xMidYMid slice'", "slice"), ("preserveAspectRatio='?'", "?")]
+    {
+        let refused = read(["100", "60"], also).unwrap_err().to_string();
+        assert!(refused.contains("preserveAspectRatio") && refused.contains(word), "{refused}");
+    }
+}
+
 #[test]
 fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
