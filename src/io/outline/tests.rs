@@ -153,6 +153,30 @@ fn the_aspect_ratio_of_a_page_is_kept_as_svg_says() {
     }
 }
 
+/// Points that are the same but for rounding are one: those of relative coordinates, where an outline comes
+/// back to its beginning, and repeated vertices. The bound holds what they are apart.
+#[test]
+fn points_that_only_rounding_parts_are_one() {
+    let kite = svg("<path d='m80.012 50.0 -30.012 35.436 -38.288 -35.436 38.288 -29.263 30.012 29.263z'/>");
+    let area = 0.25 * 0.5 * (80.012 - 11.712) * (35.436 + 29.263);
+    assert!((kite.unwrap().region.area() - area).abs() < 1e-9);
+    for (last, off) in [("0 20 -1e-9", 1e-9), ("1e-9 20 0", 1e-9), ("-3e-9 20 -4e-9", 5e-9), ("0 20 0", 0.0)]
+    {
+        let outline = format!("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 {last}");
+        let found = from_dxf(&outline).unwrap();
+        assert_eq!((found.region.area(), found.region.curves().next().unwrap().len()), (1200.0, 4), "{last}");
+        assert!((found.off_curves - off).abs() < 1e-15, "{last}: {}", found.off_curves);
+    }
+    let within = from_dxf(
+        "0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40.000000001 20 -1e-9 10 40 20 30 10 0 20 30",
+    );
+    assert_eq!(within.unwrap().region.area(), 1200.0);
+    // Corners a tenth of a micrometre apart are drawn so.
+    let short =
+        from_dxf("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 0 20 1e-4").unwrap();
+    assert_eq!((short.region.curves().next().unwrap().len(), short.off_curves), (5, 0.0));
+}
+
 #[test]
 fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
