@@ -177,6 +177,52 @@ fn points_that_only_rounding_parts_are_one() {
     assert_eq!((short.region.curves().next().unwrap().len(), short.off_curves), (5, 0.0));
 }
 
+/// Of the subpaths of one path those bound what is filled that have it on one side only: by the rule of its
+/// fill. Here the outer one is 80 by 60, and what lies in it 40 by 40 and 20 by 20; half a millimetre a unit.
+#[test]
+fn outlines_within_a_fill_are_left_out_by_its_rule() {
+    let path = |also: &str, inner: &str| format!("<path d='M0 0 H80 V60 H0 Z {inner}' {also}/>");
+    let (with, against) = ("M20 10 h40 v40 h-40 z", "M20 10 v40 h40 v-40 z");
+    let within = "M30 20 h20 v20 h-20 z";
+    let is = |body: String, area: f64, left_out: usize| {
+        let found = svg(&body).unwrap();
+        assert_eq!(found.region.area().round(), area, "{body}");
+        let note = format!("left out: {left_out}");
+        let told = found.notes.iter().find(|note| note.contains("on both sides"));
+        assert_eq!(told.is_some_and(|n| n.contains(&note)), left_out > 0, "{body}: {:?}", found.notes);
+    };
+    is(path("", with), 1200.0, 1);
+    is(path("", against), 800.0, 0);
+    is(path("", &format!("{with} {within}")), 1200.0, 2);
+    is(path("", &format!("{against} {within}")), 900.0, 0);
+    is(path("", "M20 10 h40 v40 h-40 v-40"), 1200.0, 1);
+    for also in [
+        "fill-rule='evenodd'",
+        "style='fill-rule: evenodd'",
+        "fill-rule='nonzero' style='fill-rule:evenodd'",
+        "fill='none' stroke='black'",
+    ] {
+        is(path(also, with), 800.0, 0);
+        is(format!("<g {also}>{}</g>", path("", with)), 800.0, 0);
+    }
+    is(format!("<g fill-rule='evenodd'>{}</g>", path("fill-rule='nonzero'", with)), 1200.0, 1);
+    is(format!("<g fill-rule='evenodd'>{}</g>", path("fill-rule='inherit'", with)), 800.0, 0);
+    is(format!("<g transform='scale(-1 1)'>{}</g>", path("", with)), 1200.0, 1);
+    // Shapes of their own are outlines and islands as they lie, and what crosses is refused as ever.
+    is(path("", with) + "<circle cx='40' cy='30' r='10'/>", (1200.0 - 25.0 * PI).round(), 1);
+    assert!(svg(&path("", "M60 10 h40 v40 h-40 z")).unwrap_err().to_string().contains("meet at"));
+    let sheet = |rule: &str, body: &str| svg(&format!("<style>.a{{{rule}}}</style>{body}"));
+    for rule in ["fill-rule:evenodd", "fill:none;stroke:red"] {
+        let refused = sheet(rule, &path("class='a'", with)).unwrap_err().to_string();
+        assert!(refused.contains("path") && refused.contains("`fill-rule`"), "{refused}");
+        assert_eq!(sheet(rule, &path("class='a'", against)).unwrap().region.area().round(), 800.0, "{rule}");
+    }
+    let told = sheet("fill:red", &path("fill-rule='evenodd'", with)).unwrap();
+    assert_eq!(told.region.area().round(), 800.0);
+    let refused = svg(&path("fill-rule='var(--a)'", with)).unwrap_err().to_string();
+    assert!(refused.contains("`fill-rule`"), "{refused}");
+}
+
 #[test]
 fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
