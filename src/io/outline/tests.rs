@@ -285,6 +285,17 @@ fn square(x: f64, also: &str) -> String {
     format!("<rect x='{x}' y='10' width='20' height='20' {also}/>")
 }
 
+#[test]
+fn a_drawing_without_a_unit_tells_how_many_make_an_inch() {
+    for (page, inch) in
+        [("viewBox='0 0 100 50'", "96"), ("width='400' height='200' viewBox='0 0 100 50'", "24")]
+    {
+        let text = format!("<svg {page}>{}</svg>", square(10.0, ""));
+        let notes = parse(text.as_bytes(), svg::FORMAT, &options()).unwrap().notes;
+        assert!(notes[0].contains(&format!("no unit; {inch} of its units")), "{notes:?}");
+    }
+}
+
 /// Outlines that an SVG hides are left out, and the notes say so.
 #[test]
 fn what_an_svg_hides_is_left_out() {

@@ -138,7 +138,8 @@ pub(super) fn map_of(
     };
     let named = |l: Option<Length>| l.is_some_and(|l| !matches!(l.unit, LengthUnit::None | LengthUnit::Px));
     if options.scale.is_none() && !named(width) && !named(height) {
-        notes.push("the drawing has no unit; 96 of its units make an inch".into());
+        let inch = (25.4 / scales[0] * 1e4).round() / 1e4;
+        notes.push(format!("the drawing has no unit; {inch} of its units make an inch"));
     }
     if let Some(scale) = scales.into_iter().find(|scale| !(*scale > 0.0 && scale.is_finite())) {
         return Err(fault(root, format!("one unit of the drawing is {scale} mm")));
