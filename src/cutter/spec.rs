@@ -10,7 +10,7 @@ pub enum CutterWordError {
     #[error("\"{0}\" is no shape of a cutter; write {forms}", forms = short_forms())]
     Shape(String),
     /// Too few or too many numbers.
-    #[error("{word} takes {wanted} numbers and {given} were given; write {usage}")]
+    #[error("{word} takes {wanted} number{}, and {given} given; write {usage}", if *wanted == 1 { "" } else { "s" })]
     Count {
         /// The shape.
         word: &'static str,
@@ -88,7 +88,7 @@ mod tests {
     fn other_words_are_refused_with_what_is_expected() {
         assert!(refused("bal:6").contains("\"bal\" is no shape"));
         assert!(refused("").contains("no shape"));
-        assert!(refused("ball").contains("takes 1 numbers and 0 were given"));
+        assert!(refused("ball").contains("takes 1 number, and 0 given"));
         assert!(refused("ball:6:3").contains("ball:DIAMETER"));
         assert!(refused("bull:10").contains("takes 2 numbers"));
         assert!(refused("ball:six").contains("\"six\" is not a number"));

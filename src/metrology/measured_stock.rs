@@ -36,6 +36,19 @@ pub enum MeasureError {
         /// Those of the part's, seen from above.
         part: [Point2; 2],
     },
+    /// The stock, where no move cut it, does not stand as high as the part.
+    #[error(
+        "at x {:.3} y {:.3} the stock is {stands} mm high where no move cut it, and the part {design:.6} mm; begin with \
+         stock that lies over all of the part", at.x, at.y
+    )]
+    Below {
+        /// Centre of a cell.
+        at: Point2,
+        /// Height of the stock there, mm.
+        stands: f32,
+        /// That of the part, mm.
+        design: f64,
+    },
     /// The stock has not as many heights, or not as many moves, as its grid has cells.
     #[error("the stock has {heights} heights and {moves} moves for {cells} cells")]
     Cells {
@@ -81,7 +94,7 @@ impl From<CutError> for MeasureError {
 }
 
 /// Whether `cut` lies over the part and is what the path left: every cell stands where the move that it names
-/// cuts, and none higher than the middle of any move.
+/// cuts, or above the part where it names none, and none higher than the middle of any move.
 pub(super) fn check_stock(
     part: &Part,
     cutter: &Cutter,
@@ -111,9 +124,19 @@ pub(super) fn check_stock(
         let agrees = over <= rounding && (!is_by_it || over >= -rounding);
         (!agrees).then_some(MeasureError::NotCut { at, stands, leaves, move_index })
     };
+    let below = |k: usize| {
+        let (at, stands) = (grid.centre(k % grid.nx, k / grid.nx), cut.height[k]);
+        let design = part.highest_at(at.x, at.y)?.point.z;
+        let rounding = HEIGHTS + f64::from(f32::EPSILON) * design.abs();
+        let lies_over = f64::from(stands) >= design - rounding;
+        (!lies_over).then_some(MeasureError::Below { at, stands, design })
+    };
     parallel::try_map(grid.ny, |j| {
         monitor::check(monitor)?;
-        (j * grid.nx..(j + 1) * grid.nx).filter(|k| cut.cut_by[*k] != NOT_CUT).try_for_each(|k| {
+        (j * grid.nx..(j + 1) * grid.nx).try_for_each(|k| {
+            if cut.cut_by[k] == NOT_CUT {
+                return below(k).map_or(Ok(()), Err);
+            }
             let move_index = cut.cut_by[k] as usize;
             if move_index >= path.len() {
                 return Err(MeasureError::OtherPath { move_index, moves: path.len() });
@@ -292,6 +315,17 @@ mod tests {
             refused(&fewer),
             Some(MeasureError::Cells { cells: 2000, heights: 0, moves: 2000 })
         ));
+    }
+
+    #[test]
+    fn a_stock_below_the_part_is_refused() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        for (top, lies_over) in [(-1.0, false), (-1e-4, false), (f64::NAN, false), (0.0, true)] {
+            let stock = cut(ZMap::block(grid(&plate()), top), &cutter, &path(), &Silent).unwrap();
+            let error = measured(&path(), &stock).err();
+            let is_below = matches!(error, Some(MeasureError::Below { design: 0.0, .. }));
+            assert_eq!((is_below, error.is_none()), (!lies_over, lies_over), "{top}: {error:?}");
+        }
     }
 
     #[test]

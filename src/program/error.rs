@@ -45,6 +45,9 @@ pub enum Fault {
     /// A number with too many digits, points or signs.
     #[error("`{0}` is not a number")]
     Malformed(String),
+    /// A chord tolerance by which no motion is divided, mm.
+    #[error("the chord tolerance is {0} mm; it must be above 0")]
+    Chord(f64),
     /// A comment that does not end.
     #[error("the comment has no closing parenthesis")]
     OpenComment,
@@ -267,6 +270,7 @@ impl Fault {
             Self::Character(_) | Self::Number(_) | Self::Malformed(_) | Self::Expected(_) => {
                 "correct the word, or put remarks in parentheses"
             }
+            Self::Chord(_) => "ask for a chord tolerance above 0",
             Self::OpenComment => "close it with `)` in the same line",
             Self::Function(_) => {
                 "use ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT or TAN with brackets"

@@ -217,9 +217,11 @@ impl<'a> Interpreter<'a> {
         text.number()?;
         text.skip_blanks();
         match text.peek() {
-            None | Some(b'(' | b';') => Ok(Next::Line),
+            None => Ok(Next::Line),
             Some(b)
-                if b.is_ascii_alphabetic() && !text.rest().get(1).is_some_and(u8::is_ascii_alphabetic) =>
+                if matches!(b, b'(' | b';')
+                    || b.is_ascii_alphabetic()
+                        && !text.rest().get(1).is_some_and(u8::is_ascii_alphabetic) =>
             {
                 let from = text.at();
                 self.step(line, from)

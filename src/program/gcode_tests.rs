@@ -89,6 +89,15 @@ fn moves_are_off_arcs_by_no_more_than_is_told() {
     assert_eq!(straight.origin.strays, 0.0);
 }
 
+#[test]
+fn a_chord_tolerance_that_is_none_is_refused() {
+    let program = read("G0 X1\nG2 X3 I1 F100\nM30\n");
+    for chord in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+        let refused = program.runs(&Placing { chord, kinematics: None, lengths: &|_| None }).err();
+        assert!(matches!(refused.map(|e| e.fault), Some(crate::Fault::Chord(_))), "{chord}");
+    }
+}
+
 /// Minutes that the feeds of a program ask for on a table that turns about x and z.
 fn minutes_on_a_table(text: &str) -> f64 {
     let kinematics = machine::kinematics::Kinematics::by_name("ac-table").unwrap();

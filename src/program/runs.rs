@@ -61,11 +61,16 @@ impl Program {
     /// The runs of all tools, in order. A tool that comes again has another run.
     ///
     /// # Errors
-    /// [`ProgramError`] where a rotary axis turns that the machine does not have.
+    /// [`ProgramError`] where a rotary axis turns that the machine does not have, and for a chord tolerance that is
+    /// not above 0.
     ///
     /// # Tolerance
     /// The motion is off the moves by no more than [`motion::Origin::strays`], mm.
     pub fn runs(&self, placing: &Placing<'_>) -> Result<Vec<ToolRun>, ProgramError> {
+        if !(placing.chord > 0.0 && placing.chord.is_finite()) {
+            let fault = Fault::Chord(placing.chord);
+            return Err(ProgramError { name: self.name.clone(), line: 1, column: 1, fault });
+        }
         let mut runs: Vec<Run> = Vec::new();
         let mut dwells = self.dwells.iter().peekable();
         for (k, step) in self.steps.iter().enumerate() {

@@ -125,7 +125,8 @@ pub fn plan(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
-    if settings.allowance <= 0.0 {
+    settings.check()?;
+    if settings.allowance == 0.0 {
         return plan_on(part, cutter, strategy, settings, monitor);
     }
     let (grown, below) = cutter.grown(settings.allowance).map_err(|error| PlanError::NotApplicable {
@@ -219,6 +220,7 @@ pub fn plan_tilted(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
+    settings.check()?;
     part.mesh().surface().map_err(|e| PlanError::NotApplicable {
         strategy: strategy.definition().word,
         reason: format!("a cutter that tilts needs a surface with two sides. {e}"),

@@ -1,13 +1,39 @@
 //! Open polylines joined to closed ones where their ends meet within [`JOIN_TOLERANCE`].
 
-use super::{Drawn, JOIN_TOLERANCE, OutlineError};
+use super::{Chords, Drawn, JOIN_TOLERANCE, OutlineError};
 use geometry::Point2;
 
-/// Gaps below this, mm, are rounding of the file and not worth a note.
+/// Points that lie no farther apart, mm, are one but for rounding of the file.
 const ROUNDING: f64 = 1.0e-6;
 
 fn gap(a: &Point2, b: &Point2) -> f64 {
     (a - b).norm()
+}
+
+impl Chords {
+    /// Without points that repeat the one before, and closed where its ends meet. What that moves is in the
+    /// bound.
+    pub fn tidy(&mut self) {
+        let mut moved = 0.0f64;
+        self.points.dedup_by(|next, kept| {
+            let between = gap(next, kept);
+            moved = if between <= ROUNDING { moved.max(between) } else { moved };
+            between <= ROUNDING
+        });
+        let is_repeated = |chords: &Self| {
+            let within = if chords.closed { ROUNDING } else { JOIN_TOLERANCE };
+            let between = gap(&chords.points[0], &chords.points[chords.points.len() - 1]);
+            Some(between).filter(|between| *between <= within)
+        };
+        while self.points.len() > 3
+            && let Some(between) = is_repeated(self)
+        {
+            self.points.pop();
+            self.closed = true;
+            moved = moved.max(between);
+        }
+        self.off_curve += moved;
+    }
 }
 
 /// All as closed outlines.
@@ -18,16 +44,7 @@ pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, Ou
     let mut closed = Vec::new();
     let mut open: Vec<Drawn> = Vec::new();
     for mut d in drawn {
-        let chords = &mut d.chords;
-        chords.points.dedup();
-        if !chords.closed && chords.points.len() > 3 {
-            let between = gap(&chords.points[0], &chords.points[chords.points.len() - 1]);
-            if between <= JOIN_TOLERANCE {
-                chords.points.pop();
-                chords.closed = true;
-                chords.off_curve += between;
-            }
-        }
+        d.chords.tidy();
         match (d.chords.closed, d.chords.points.len()) {
             (true, _) => closed.push(d),
             (false, 0 | 1) => notes.push(format!("{} has no length and is left out", d.name())),

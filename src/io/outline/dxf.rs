@@ -3,10 +3,14 @@
 //! Read are LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE and POLYLINE with bulges, and SPLINE by control points, of
 //! model space, in the plane z = const seen from above or below. Other entities are named in a note, and so
 //! are those that are left out because they are invisible or on a layer that is frozen or off; inserted
-//! blocks are refused, since geometry may hide in them, and so are entities whose z varies.
+//! blocks that show something on the layers that are read are refused, and so are entities whose z varies.
+
+mod blocks;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+
+use blocks::{Blocks, Layers};
 
 use super::curve::Spline;
 use super::{Chords, Drawn, OutlineError, OutlineFormat, OutlineOptions};
@@ -72,6 +76,10 @@ impl Entity<'_> {
 
     fn point(&self, code: i32) -> Result<Point2, OutlineError> {
         Ok(Point2::new(self.needed(code)?, self.needed(code + 10)?))
+    }
+
+    fn layer(&self) -> &str {
+        self.text(8).unwrap_or("0")
     }
 
     fn flags(&self) -> i64 {
@@ -150,27 +158,49 @@ fn pairs(text: &str) -> Result<Vec<CodePair<'_>>, OutlineError> {
     Ok(all)
 }
 
-/// Names of the layers that are frozen or off, lower case: names of layers are compared so.
-fn hidden_layers(pairs: &[CodePair<'_>]) -> Vec<String> {
+/// What lies between the name of a section and its end.
+fn section<'a>(pairs: &'a [CodePair<'a>], name: &str) -> Option<&'a [CodePair<'a>]> {
     let is = |p: &CodePair<'_>, code: i32, value: &str| p.code == code && p.value == value;
-    let Some(from) = pairs.windows(2).position(|w| is(&w[0], 0, "SECTION") && is(&w[1], 2, "TABLES")) else {
-        return Vec::new();
-    };
+    let from = pairs.windows(2).position(|w| is(&w[0], 0, "SECTION") && is(&w[1], 2, name))?;
     let body = &pairs[from + 2..];
-    let body = &body[..body.iter().position(|p| is(p, 0, "ENDSEC")).unwrap_or(body.len())];
+    Some(&body[..body.iter().position(|p| is(p, 0, "ENDSEC")).unwrap_or(body.len())])
+}
+
+/// The entities, or entries of tables, of a section.
+fn items<'a>(body: &'a [CodePair<'a>]) -> impl Iterator<Item = Entity<'a>> {
     let starts: Vec<usize> = (0..body.len()).filter(|&k| body[k].code == 0).collect();
-    let entries = starts.iter().enumerate().filter(|(_, k)| body[**k].value == "LAYER").map(|(n, &k)| {
-        let end = starts.get(n + 1).copied().unwrap_or(body.len());
-        &body[k + 1..end]
-    });
-    let number = |entry: &[CodePair<'_>], code: i32| -> i64 {
-        entry.iter().find(|p| p.code == code).and_then(|p| p.value.parse().ok()).unwrap_or(0)
-    };
-    // The first bit freezes a layer, and a colour below zero turns it off.
-    entries
-        .filter(|entry| number(entry, 70) & 1 == 1 || number(entry, 62) < 0)
-        .filter_map(|entry| entry.iter().find(|p| p.code == 2).map(|p| p.value.to_lowercase()))
-        .collect()
+    (0..starts.len()).map(move |n| {
+        let (from, end) = (starts[n], starts.get(n + 1).copied().unwrap_or(body.len()));
+        Entity { name: body[from].value, line: body[from].line, pairs: &body[from + 1..end] }
+    })
+}
+
+/// Why an entity is left out, if it is.
+///
+/// # Errors
+/// For an inserted block that shows something on the layers that are read.
+fn why_left_out(
+    entity: &Entity<'_>,
+    read: &Layers<'_>,
+    blocks: &Blocks<'_>,
+) -> Result<Option<&'static str>, OutlineError> {
+    if entity.name == "INSERT"
+        && !entity.is_invisible()
+        && let Some(what) = blocks.shown(entity, read)
+    {
+        let cure = "inserted blocks are not read; explode them before exporting";
+        return Err(entity.fault(format!("{what}; {cure}")));
+    }
+    let layer = entity.layer();
+    Ok(if !read.is_wanted(layer) {
+        Some("entities of other layers")
+    } else if entity.is_invisible() {
+        Some("invisible entities")
+    } else if read.is_hidden(layer) {
+        Some("entities on layers that are frozen or off")
+    } else {
+        (entity.name == "INSERT").then_some("inserted blocks that show nothing on the layers that are read")
+    })
 }
 
 /// The drawn entities, mm.
@@ -190,16 +220,15 @@ fn parse(
         notes.push("the drawing does not say its unit; mm is assumed".into());
     }
     let scale = options.scale.or(unit).unwrap_or(1.0);
-    let entities = entities(&pairs)?;
+    let body = section(&pairs, "ENTITIES").ok_or_else(|| OutlineError::new("it has no section ENTITIES"))?;
+    let entities: Vec<Entity<'_>> = items(body).collect();
     let tolerance = options.chord_tolerance / scale;
     let mut drawn = Vec::new();
     let mut ignored: BTreeMap<&str, usize> = BTreeMap::new();
-    let mut other_layers = 0usize;
-    let hidden_layers = hidden_layers(&pairs);
-    let (mut invisible, mut on_hidden_layers) = (0usize, 0usize);
+    let mut left_out: BTreeMap<&str, usize> = BTreeMap::new();
+    let (read, blocks) = (Layers::of(&pairs, options.layer.as_deref()), Blocks::of(&pairs));
     let mut heights: Option<[f64; 2]> = None;
-    if let Some(layer) = options.layer.as_ref().filter(|layer| hidden_layers.contains(&layer.to_lowercase()))
-    {
+    if let Some(layer) = read.wanted.filter(|layer| read.is_hidden(layer)) {
         return Err(OutlineError::new(format!(
             "the layer \"{layer}\" is frozen or off in the drawing; turn it on there, or name another `layer`"
         )));
@@ -218,7 +247,7 @@ fn parse(
                 k += 1;
             }
         }
-        let layer = entity.text(8).unwrap_or("0");
+        let layer = entity.layer();
         if !layers.contains(&layer) {
             layers.push(layer);
         }
@@ -226,16 +255,8 @@ fn parse(
         if entity.text(67) == Some("1") {
             continue;
         }
-        if options.layer.as_ref().is_some_and(|wanted| wanted != layer) {
-            other_layers += 1;
-            continue;
-        }
-        if entity.is_invisible() {
-            invisible += 1;
-            continue;
-        }
-        if hidden_layers.contains(&layer.to_lowercase()) {
-            on_hidden_layers += 1;
+        if let Some(reason) = why_left_out(entity, &read, &blocks)? {
+            *left_out.entry(reason).or_default() += 1;
             continue;
         }
         match draw(entity, vertices, tolerance)? {
@@ -255,15 +276,7 @@ fn parse(
             layers.join("\", \"")
         )));
     }
-    if other_layers > 0 {
-        notes.push(format!("{other_layers} entities of other layers are left out"));
-    }
-    if invisible > 0 {
-        notes.push(format!("invisible entities, left out: {invisible}"));
-    }
-    if on_hidden_layers > 0 {
-        notes.push(format!("entities on layers that are frozen or off, left out: {on_hidden_layers}"));
-    }
+    notes.extend(left_out.iter().map(|(reason, count)| format!("{reason}, left out: {count}")));
     if let Some([least, most]) = heights.filter(|[least, most]| most - least > LEVEL * scale) {
         notes.push(format!(
             "its outlines lie at heights from z {least} to {most}; all are taken to the floor of the pocket"
@@ -290,23 +303,6 @@ fn header_unit(pairs: &[CodePair<'_>]) -> Result<Option<f64>, OutlineError> {
             format!("$INSUNITS is {code}, a unit that is not known here; write `unit` in the scene"),
         )
     })
-}
-
-fn entities<'a>(pairs: &'a [CodePair<'a>]) -> Result<Vec<Entity<'a>>, OutlineError> {
-    let is = |p: &CodePair<'_>, code: i32, value: &str| p.code == code && p.value == value;
-    let Some(from) = pairs.windows(2).position(|w| is(&w[0], 0, "SECTION") && is(&w[1], 2, "ENTITIES"))
-    else {
-        return Err(OutlineError::new("it has no section ENTITIES"));
-    };
-    let body = &pairs[from + 2..];
-    let end = body.iter().position(|p| is(p, 0, "ENDSEC")).unwrap_or(body.len());
-    let body = &body[..end];
-    let starts: Vec<usize> = (0..body.len()).filter(|&k| body[k].code == 0).collect();
-    let entity = |(n, &k): (usize, &usize)| {
-        let end = starts.get(n + 1).copied().unwrap_or(body.len());
-        Entity { name: body[k].value, line: body[k].line, pairs: &body[k + 1..end] }
-    };
-    Ok(starts.iter().enumerate().map(entity).collect())
 }
 
 /// The chord points of an entity and whether it is closed; `None` for kinds that are no outlines.
@@ -404,7 +400,6 @@ fn draw(
             // Whether it is closed shows at its ends.
             spline.chords(tolerance)
         }
-        "INSERT" => return Err(entity.fault("inserted blocks are not read; explode them before exporting")),
         _ => return Ok(None),
     };
     if drawn.points.len() > MAX_VERTICES {

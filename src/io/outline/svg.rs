@@ -7,6 +7,7 @@
 //! animations, shapes for some readers only, and style sheets that show, hide, place or size shapes. Sheets
 //! of colours and pens are passed over; texts and images are named.
 
+mod fill;
 mod page;
 mod style;
 
@@ -16,8 +17,10 @@ use std::f64::consts::TAU;
 use roxmltree::{Document, Node};
 use svgtypes::{PathParser, PathSegment, PointsParser};
 
-use page::{Map, map_of, transformed, user};
-use style::{MARKERS, Pens, check_sheet, check_style, is_any, is_displayed, is_usual, keyword, property_of};
+use page::{Map, map_of, radius, transformed, user};
+use style::{
+    MARKERS, Pens, Sheets, check_sheet, check_style, is_any, is_displayed, is_usual, keyword, property_of,
+};
 
 use super::{Chords, Drawn, OutlineError, OutlineFormat, OutlineOptions};
 use geometry::Point2;
@@ -51,10 +54,11 @@ struct Reader<'a> {
     drawn: Vec<Drawn>,
     ignored: BTreeMap<String, usize>,
     seen_layer: bool,
-    /// Whether a style sheet says which pens draw: then each shape counts as drawn.
-    sheet_has_pens: bool,
+    sheets: Sheets,
     hidden: usize,
     without_pen: usize,
+    /// Subpaths with the fill of their path on both sides.
+    within_fill: usize,
 }
 
 fn line_of(node: &Node<'_, '_>) -> usize {
@@ -131,10 +135,10 @@ fn parse(
         return Err(OutlineError::at(1, format!("its root is <{}>, not <svg>", root.tag_name().name())));
     }
     let map = map_of(&root, options, notes)?;
-    let mut sheet_has_pens = false;
+    let mut sheets = Sheets::default();
     for node in root.descendants() {
         if node.tag_name().name() == "style" {
-            sheet_has_pens |= check_sheet(&node)?;
+            check_sheet(&node, &mut sheets)?;
         } else if is_animation(&node) && has_link(&node) {
             return Err(fault(
                 &node,
@@ -148,9 +152,10 @@ fn parse(
         drawn: Vec::new(),
         ignored: BTreeMap::new(),
         seen_layer: options.layer.is_none(),
-        sheet_has_pens,
+        sheets,
         hidden: 0,
         without_pen: 0,
+        within_fill: 0,
     };
     reader.root(&root, map, options)?;
     if !reader.seen_layer {
@@ -162,6 +167,12 @@ fn parse(
     }
     if reader.without_pen > 0 {
         notes.push(format!("shapes that neither fill nor stroke draws, left out: {}", reader.without_pen));
+    }
+    if reader.within_fill > 0 {
+        notes.push(format!(
+            "outlines with the fill of their path on both sides, by its `fill-rule`, left out: {}",
+            reader.within_fill
+        ));
     }
     notes.extend(
         reader
@@ -252,10 +263,12 @@ impl Reader<'_> {
         if let Some(refused) = place.refused {
             return Err(refused.clone());
         }
-        if !self.sheet_has_pens && !place.pens.draw(name) {
+        // Where a style sheet says which pens draw, each shape counts as drawn.
+        if !self.sheets.pens && !place.pens.draw(name) {
             self.without_pen += 1;
             return Ok(());
         }
+        let curves = self.bounding_the_fill(node, place.pens, curves)?;
         let has_markers = |n: Node<'_, '_>| {
             MARKERS.iter().any(|marker| property_of(&n, marker).is_some_and(|value| value != "none"))
         };
@@ -270,6 +283,29 @@ impl Reader<'_> {
             self.drawn.push(Drawn { chords, line: line_of(node), entity: id.clone() });
         }
         Ok(())
+    }
+
+    /// Of the curves of a shape those that are seen where it is filled.
+    fn bounding_the_fill(
+        &mut self,
+        node: &Node<'_, '_>,
+        pens: Pens,
+        mut curves: Vec<Chords>,
+    ) -> Result<Vec<Chords>, OutlineError> {
+        let Sheets { fill, fill_rule, .. } = self.sheets;
+        if curves.len() < 2 || !(fill || pens.fill()) || !(fill_rule || pens.fill_is_nonzero) {
+            return Ok(curves);
+        }
+        curves.iter_mut().for_each(Chords::tidy);
+        let within = fill::within(&curves);
+        if !within.is_empty() && (fill || fill_rule) {
+            let what = "what it fills depends on its `fill-rule`, and a style sheet sets how shapes are filled, \
+                        which is not read; save the drawing with presentation attributes instead";
+            return Err(fault(node, what));
+        }
+        self.within_fill += within.len();
+        let seen = curves.into_iter().enumerate().filter(|(k, _)| !within.contains(k));
+        Ok(seen.map(|(_, curve)| curve).collect())
     }
 
     /// Of a <switch>, the first element that is for all readers is drawn. One before it that is for some
@@ -311,9 +347,10 @@ impl Reader<'_> {
             "ellipse" => round(or("cx", 0.0)?, or("cy", 0.0)?, positive("rx")?, positive("ry")?),
             "rect" => {
                 let (x, y, w, h) = (or("x", 0.0)?, or("y", 0.0)?, positive("width")?, positive("height")?);
-                let (rx, ry) = (user(node, "rx")?, user(node, "ry")?);
-                let rx0 = rx.or(ry).unwrap_or(0.0).clamp(0.0, 0.5 * w);
-                let ry0 = ry.or(rx).unwrap_or(0.0).clamp(0.0, 0.5 * h);
+                let (rx, ry) = (radius(node, "rx")?, radius(node, "ry")?);
+                let radii = [rx.or(ry).unwrap_or(0.0).min(0.5 * w), ry.or(rx).unwrap_or(0.0).min(0.5 * h)];
+                // Without one of the two a corner is square.
+                let [rx0, ry0] = if radii.contains(&0.0) { [0.0; 2] } else { radii };
                 let mut chords = Chords::closed(Vec::new());
                 let corners = [
                     (x + w - rx0, y + ry0, -0.25),
@@ -325,7 +362,7 @@ impl Reader<'_> {
                     let (from, to) = (from * TAU, (from + 0.25) * TAU);
                     let axes = [map.x * rx0, map.y * ry0];
                     chords.points.push(map.at(cx, cy) + axes[0] * from.cos() + axes[1] * from.sin());
-                    if rx0 > 0.0 && ry0 > 0.0 {
+                    if rx0 > 0.0 {
                         chords.ellipse(map.at(cx, cy), axes, from, to, self.tolerance);
                     }
                 }

@@ -103,6 +103,126 @@ fn every_kind_of_svg_element_has_the_area_of_its_closed_form() {
     assert_eq!(flipped, [Point2::new(0.0, 40.0), Point2::new(5.0, 50.0)], "y runs up from the lower edge");
 }
 
+/// Corners of a rect follow SVG 2: a radius of 0 squares them whatever the other one is, and one that is
+/// negative or `auto` is the other one.
+#[test]
+fn corners_of_a_rect_have_the_radii_that_svg_says() {
+    let square = |also: &str, area: f64| near(svg(&format!("<rect width='80' height='60' {also}/>")), area);
+    for also in ["rx='0' ry='20'", "rx='20' ry='0'", "rx='-4' ry='-4'", "rx='auto' ry='-1'"] {
+        square(also, 1200.0);
+    }
+    for also in ["rx='-4' ry='20'", "rx=' auto ' ry='20'", "rx='20' ry='-4'", "ry='20'"] {
+        square(also, 1200.0 - (4.0 - PI) * 100.0);
+    }
+    square("rx='60' ry='20'", 1200.0 - (4.0 - PI) * 200.0);
+}
+
+/// Where width and height scale the viewBox differently, its `preserveAspectRatio` says what holds: one unit
+/// is a millimetre in x and more, or less, in y.
+#[test]
+fn the_aspect_ratio_of_a_page_is_kept_as_svg_says() {
+    let read = |size: [&str; 2], also: &str| {
+        let text = format!(
+            "<svg width='{}mm' height='{}mm' viewBox='10 0 100 50' {also}><rect x='10' width='100' height='50'/></svg>",
+            size[0], size[1]
+        );
+        parse(text.as_bytes(), svg::FORMAT, &options())
+    };
+    let is = |size: [&str; 2], also: &str, lo: [f64; 2], hi: [f64; 2], noted: bool| {
+        let found = read(size, also).unwrap();
+        let bounds = found.region.bounds().unwrap();
+        for (found, wanted) in bounds.iter().zip([lo, hi]) {
+            assert!((found - Point2::from(wanted)).norm() < 1e-9, "{size:?} {also}: {bounds:?}");
+        }
+        assert_eq!(found.notes.join("").contains("preserveAspectRatio"), noted, "{also}: {:?}", found.notes);
+    };
+    is(["100", "50"], "preserveAspectRatio='xMidYMid slice'", [0.0, 0.0], [100.0, 50.0], false);
+    is(["100.09", "50"], "", [0.045, 0.0], [100.045, 50.0], true);
+    is(["100", "60"], "preserveAspectRatio='xMidYMid meet'", [0.0, 5.0], [100.0, 55.0], true);
+    // y runs up: the upper edges meet with YMin, the lower ones with YMax.
+    is(["100", "60"], "preserveAspectRatio='xMaxYMin'", [0.0, 10.0], [100.0, 60.0], true);
+    is(["100", "60"], "preserveAspectRatio='xMinYMax'", [0.0, 0.0], [100.0, 50.0], true);
+    is(["120", "50"], "preserveAspectRatio='xMaxYMid'", [20.0, 0.0], [120.0, 50.0], true);
+    is(["100", "60"], "preserveAspectRatio='none'", [0.0, 0.0], [100.0, 60.0], true);
+    // Rounded to the last decimal that is written: less than a micrometre over the page.
+    is(["100.0000004", "50"], "", [0.0000002, 0.0], [100.0000002, 50.0], false);
+    for (also, word) in [("preserveAspectRatio='xMidYMid slice'", "slice"), ("preserveAspectRatio='?'", "?")]
+    {
+        let refused = read(["100", "60"], also).unwrap_err().to_string();
+        assert!(refused.contains("preserveAspectRatio") && refused.contains(word), "{refused}");
+    }
+}
+
+/// Points that are the same but for rounding are one: those of relative coordinates, where an outline comes
+/// back to its beginning, and repeated vertices. The bound holds what they are apart.
+#[test]
+fn points_that_only_rounding_parts_are_one() {
+    let kite = svg("<path d='m80.012 50.0 -30.012 35.436 -38.288 -35.436 38.288 -29.263 30.012 29.263z'/>");
+    let area = 0.25 * 0.5 * (80.012 - 11.712) * (35.436 + 29.263);
+    assert!((kite.unwrap().region.area() - area).abs() < 1e-9);
+    for (last, off) in [("0 20 -1e-9", 1e-9), ("1e-9 20 0", 1e-9), ("-3e-9 20 -4e-9", 5e-9), ("0 20 0", 0.0)]
+    {
+        let outline = format!("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 {last}");
+        let found = from_dxf(&outline).unwrap();
+        assert_eq!((found.region.area(), found.region.curves().next().unwrap().len()), (1200.0, 4), "{last}");
+        assert!((found.off_curves - off).abs() < 1e-15, "{last}: {}", found.off_curves);
+    }
+    let within = from_dxf(
+        "0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40.000000001 20 -1e-9 10 40 20 30 10 0 20 30",
+    );
+    assert_eq!(within.unwrap().region.area(), 1200.0);
+    // Corners a tenth of a micrometre apart are drawn so.
+    let short =
+        from_dxf("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 0 20 1e-4").unwrap();
+    assert_eq!((short.region.curves().next().unwrap().len(), short.off_curves), (5, 0.0));
+}
+
+/// Of the subpaths of one path those bound what is filled that have it on one side only: by the rule of its
+/// fill. Here the outer one is 80 by 60, and what lies in it 40 by 40 and 20 by 20; half a millimetre a unit.
+#[test]
+fn outlines_within_a_fill_are_left_out_by_its_rule() {
+    let path = |also: &str, inner: &str| format!("<path d='M0 0 H80 V60 H0 Z {inner}' {also}/>");
+    let (with, against) = ("M20 10 h40 v40 h-40 z", "M20 10 v40 h40 v-40 z");
+    let within = "M30 20 h20 v20 h-20 z";
+    let is = |body: String, area: f64, left_out: usize| {
+        let found = svg(&body).unwrap();
+        assert_eq!(found.region.area().round(), area, "{body}");
+        let note = format!("left out: {left_out}");
+        let told = found.notes.iter().find(|note| note.contains("on both sides"));
+        assert_eq!(told.is_some_and(|n| n.contains(&note)), left_out > 0, "{body}: {:?}", found.notes);
+    };
+    is(path("", with), 1200.0, 1);
+    is(path("", against), 800.0, 0);
+    is(path("", &format!("{with} {within}")), 1200.0, 2);
+    is(path("", &format!("{against} {within}")), 900.0, 0);
+    is(path("", "M20 10 h40 v40 h-40 v-40"), 1200.0, 1);
+    for also in [
+        "fill-rule='evenodd'",
+        "style='fill-rule: evenodd'",
+        "fill-rule='nonzero' style='fill-rule:evenodd'",
+        "fill='none' stroke='black'",
+    ] {
+        is(path(also, with), 800.0, 0);
+        is(format!("<g {also}>{}</g>", path("", with)), 800.0, 0);
+    }
+    is(format!("<g fill-rule='evenodd'>{}</g>", path("fill-rule='nonzero'", with)), 1200.0, 1);
+    is(format!("<g fill-rule='evenodd'>{}</g>", path("fill-rule='inherit'", with)), 800.0, 0);
+    is(format!("<g transform='scale(-1 1)'>{}</g>", path("", with)), 1200.0, 1);
+    // Shapes of their own are outlines and islands as they lie, and what crosses is refused as ever.
+    is(path("", with) + "<circle cx='40' cy='30' r='10'/>", (1200.0 - 25.0 * PI).round(), 1);
+    assert!(svg(&path("", "M60 10 h40 v40 h-40 z")).unwrap_err().to_string().contains("meet at"));
+    let sheet = |rule: &str, body: &str| svg(&format!("<style>.a{{{rule}}}</style>{body}"));
+    for rule in ["fill-rule:evenodd", "fill:none;stroke:red"] {
+        let refused = sheet(rule, &path("class='a'", with)).unwrap_err().to_string();
+        assert!(refused.contains("path") && refused.contains("`fill-rule`"), "{refused}");
+        assert_eq!(sheet(rule, &path("class='a'", against)).unwrap().region.area().round(), 800.0, "{rule}");
+    }
+    let told = sheet("fill:red", &path("fill-rule='evenodd'", with)).unwrap();
+    assert_eq!(told.region.area().round(), 800.0);
+    let refused = svg(&path("fill-rule='var(--a)'", with)).unwrap_err().to_string();
+    assert!(refused.contains("`fill-rule`"), "{refused}");
+}
+
 #[test]
 fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
@@ -163,6 +283,17 @@ fn what_is_wrong_is_told_with_its_place() {
 
 fn square(x: f64, also: &str) -> String {
     format!("<rect x='{x}' y='10' width='20' height='20' {also}/>")
+}
+
+#[test]
+fn a_drawing_without_a_unit_tells_how_many_make_an_inch() {
+    for (page, inch) in
+        [("viewBox='0 0 100 50'", "96"), ("width='400' height='200' viewBox='0 0 100 50'", "24")]
+    {
+        let text = format!("<svg {page}>{}</svg>", square(10.0, ""));
+        let notes = parse(text.as_bytes(), svg::FORMAT, &options()).unwrap().notes;
+        assert!(notes[0].contains(&format!("no unit; {inch} of its units")), "{notes:?}");
+    }
 }
 
 /// Outlines that an SVG hides are left out, and the notes say so.
@@ -315,6 +446,58 @@ fn what_a_dxf_hides_is_left_out() {
     assert!(refused.contains("\"Off\" is frozen or off"), "{refused}");
     let none = read(&with_layers("0 CIRCLE 8 0 60 1 10 40 20 0 40 5"), None).unwrap_err().to_string();
     assert!(none.contains("no outlines; invisible entities, left out: 1"), "{none}");
+}
+
+/// What a block holds is on its own layers, and on layer 0 it is on that of the INSERT: an INSERT of any
+/// layer is refused where its block shows something on the wanted one, and left out where not.
+#[test]
+fn blocks_are_refused_by_what_they_hold_on_the_wanted_layer() {
+    let circle = |layer: &str| format!("0 CIRCLE 8 {layer} 10 0 20 0 40 3");
+    let block = |name: &str, holds: &str| format!("0 BLOCK 8 0 2 {name} 70 0 {holds} 0 ENDBLK 8 0");
+    let blocks = [
+        block("boss", &circle("cut")),
+        block("plain", &circle("0")),
+        block("other", &circle("marks")),
+        block("outer", "0 INSERT 8 0 2 BOSS 0 INSERT 8 marks 2 Outer"),
+        block("carrier", "0 INSERT 8 0 2 plain"),
+        block("unseen", "0 CIRCLE 8 cut 60 1 10 0 20 0 40 3"),
+    ];
+    let read = |insert: &str| {
+        let entities = format!("0 LWPOLYLINE 8 cut {SQUARE} {insert}");
+        let text = with_layers(&entities);
+        let blocks = format!("0\nSECTION\n2\nBLOCKS\n{}\n0\nENDSEC\n", blocks.join(" ").replace(' ', "\n"));
+        parse(
+            (blocks + &text).as_bytes(),
+            dxf::FORMAT,
+            &OutlineOptions { layer: Some("cut".into()), ..options() },
+        )
+    };
+    for insert in [
+        "8 0 2 boss",
+        "8 marks 2 BOSS",
+        "8 off 2 boss",
+        "8 0 2 outer",
+        "8 cut 2 plain",
+        "8 cut 2 carrier",
+        "8 cut 2 missing",
+    ] {
+        let refused = read(&format!("0 INSERT {insert}")).unwrap_err().to_string();
+        assert!(refused.contains("INSERT") && refused.contains("explode"), "{insert}: {refused}");
+    }
+    for insert in [
+        "8 0 2 plain",
+        "8 cut 2 other",
+        "8 marks 2 carrier",
+        "8 0 2 unseen",
+        "8 Frozen 2 boss",
+        "8 0 60 1 2 boss",
+        "8 0 67 1 2 boss",
+        "8 0 2 missing",
+    ] {
+        assert_eq!(read(&format!("0 INSERT {insert}")).unwrap().region.area(), 100.0, "{insert}");
+    }
+    let refused = read("0 INSERT 8 0 2 outer").unwrap_err().to_string();
+    assert!(refused.contains("has CIRCLE (line 13) on the layer \"cut\""), "{refused}");
 }
 
 #[test]

@@ -241,8 +241,15 @@ mod tests {
         assert_eq!(tools.get(5).unwrap().cutter, Cutter::ball(6.35).unwrap());
         let tools = read("G21\nT7 M6 (FLAT END MILL D=8)\nG0 X1\n(T9 D=3)\n");
         assert_eq!((tools.tools.len(), tools.get(7).unwrap().cutter), (2, Cutter::flat(8.0).unwrap()));
-        let tools = read("(BALL END D=6.0)\nT3 M6\nG0 X1\n");
-        assert_eq!(tools.get(3).unwrap().cutter, Cutter::ball(6.0).unwrap());
+        for line in
+            ["O1000 (T1 D=6. CR=3. - ball)", ":1000(T1 D=6. CR=3. - ball)", "O1000 ;T1 D=6. CR=3. - ball"]
+        {
+            let tools = read(&format!("%\n{line}\nG21\nT1 M6\nG0 X1\nM30\n%\n"));
+            assert_eq!(tools.get(1).map(|tool| tool.cutter), Cutter::ball(6.0).ok(), "{line}");
+        }
+        for text in ["(BALL END D=6.0)\nT3 M6\nG0 X1\n", "O1000 (BALL END D=6.0) T3 M6\nG0 X1\n"] {
+            assert_eq!(read(text).get(3).unwrap().cutter, Cutter::ball(6.0).unwrap());
+        }
     }
 
     #[test]

@@ -98,6 +98,7 @@ pub fn plan_pocket(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
+    settings.check()?;
     let refuse = |reason: String| PlanError::NotApplicable { strategy: strategy.definition().word, reason };
     if !cutter.is_end_mill() {
         return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));

@@ -9,6 +9,16 @@ pub enum PlanError {
     /// Stopped by the user.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// A number of the settings by which no path can be planned.
+    #[error("the {setting} is {value}; it must be {wanted}")]
+    Setting {
+        /// Which, in words.
+        setting: &'static str,
+        /// What it is, mm or mm/min.
+        value: f64,
+        /// What is taken.
+        wanted: &'static str,
+    },
     /// The strategy does not apply to this part.
     #[error("{strategy} cannot plan this part: {reason}")]
     NotApplicable {

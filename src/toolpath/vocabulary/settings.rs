@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{Correction, Faces, Kept, Places};
+use super::{Correction, Faces, Kept, Places, PlanError};
 use crate::lowering::Lowered;
 use geometry::{Aabb, Point3};
 use machine::Machine;
@@ -88,6 +88,30 @@ pub struct PlanSettings {
     pub earlier: Option<Arc<Earlier>>,
 }
 
+impl PlanSettings {
+    /// Refuses numbers by which no path can be planned.
+    pub(crate) fn check(&self) -> Result<(), PlanError> {
+        let check = |setting, value: f64, wanted, is_in_range| match is_in_range && value.is_finite() {
+            true => Ok(()),
+            false => Err(PlanError::Setting { setting, value, wanted }),
+        };
+        let above = |setting, value| check(setting, value, "above 0", value > 0.0);
+        let from = |setting, value| check(setting, value, "0 or more", value >= 0.0);
+        match self.step {
+            Step::Scallop(height) => above("scallop height", height)?,
+            Step::Stepover(stepover) => above("stepover", stepover)?,
+        }
+        above("chord tolerance", self.chord_tolerance)?;
+        above("feed", self.feed_rate)?;
+        above("feed down", self.plunge_rate)?;
+        self.stepdown.map_or(Ok(()), |stepdown| above("stepdown", stepdown))?;
+        from("clearance", self.clearance)?;
+        from("allowance", self.allowance)?;
+        self.joining.longest_link.map_or(Ok(()), |longest| from("longest link", longest))?;
+        check("top of the stock", self.stock_top, "a finite number", true)
+    }
+}
+
 /// What a plan begins from that is made for the same toolpath once more.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Earlier {
@@ -149,5 +173,53 @@ impl Default for PlanSettings {
             memory: MEMORY,
             earlier: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Zigzag, plan};
+    use cutter::Cutter;
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use part::{Part, Patch};
+    use work::monitor::Silent;
+
+    #[test]
+    fn settings_by_which_no_path_can_be_planned_are_refused() {
+        let plane =
+            AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 6.0], [0.0, 2.0]]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(plane)], 0.01).unwrap();
+        let planned = |change: &dyn Fn(&mut PlanSettings)| {
+            let mut settings = PlanSettings { stock_top: 1.0, ..PlanSettings::default() };
+            change(&mut settings);
+            plan(&part, &Cutter::ball(6.0).unwrap(), &Zigzag::at(0.0), &settings, &Silent)
+        };
+        type Set = fn(&mut PlanSettings, f64);
+        let above: [(&str, Set); 6] = [
+            ("scallop height", |s, x| s.step = Step::Scallop(x)),
+            ("stepover", |s, x| s.step = Step::Stepover(x)),
+            ("chord tolerance", |s, x| s.chord_tolerance = x),
+            ("feed", |s, x| s.feed_rate = x),
+            ("feed down", |s, x| s.plunge_rate = x),
+            ("stepdown", |s, x| s.stepdown = Some(x)),
+        ];
+        let or_none: [(&str, Set); 3] = [
+            ("clearance", |s, x| s.clearance = x),
+            ("allowance", |s, x| s.allowance = x),
+            ("longest link", |s, x| s.joining.longest_link = Some(x)),
+        ];
+        let top: [(&str, Set); 1] = [("top of the stock", |s, x| s.stock_top = x)];
+        let wrong = |name: &str, set: Set, value: f64| {
+            let refused = planned(&|settings| set(settings, value)).err();
+            let is_named = matches!(&refused, Some(PlanError::Setting { setting, .. }) if *setting == name);
+            assert!(is_named, "{name} {value}: {refused:?}");
+        };
+        for (name, set) in above.into_iter().chain(or_none).chain(top) {
+            [f64::NAN, f64::INFINITY].into_iter().for_each(|value| wrong(name, set, value));
+        }
+        above.into_iter().for_each(|(name, set)| wrong(name, set, 0.0));
+        above.into_iter().chain(or_none).for_each(|(name, set)| wrong(name, set, -1.0));
+        assert!(or_none.into_iter().all(|(_, set)| planned(&|settings| set(settings, 0.0)).is_ok()));
     }
 }

@@ -1,7 +1,7 @@
 //! From coordinates of a drawing to mm: its page, its lengths and the transforms of its elements.
 
 use roxmltree::Node;
-use svgtypes::{Length, LengthUnit, Transform, ViewBox};
+use svgtypes::{Align, AspectRatio, Length, LengthUnit, Transform, ViewBox};
 
 use super::style::{is_usual, property_of};
 use super::{OutlineError, OutlineOptions, fault};
@@ -9,6 +9,9 @@ use geometry::{Point2, Vector2};
 
 /// mm of one CSS pixel.
 const PIXEL: f64 = 25.4 / 96.0;
+
+/// Scales that differ by less over the page, mm, are rounded in the last decimal, and not worth a note.
+const ROUNDED: f64 = 1.0e-3;
 
 /// A length in units of the drawing, where it does not depend on the page.
 fn in_units(text: &str) -> Option<f64> {
@@ -52,6 +55,15 @@ pub(super) fn user(node: &Node<'_, '_>, name: &str) -> Result<Option<f64>, Outli
     } else {
         Err(fault(node, format!("{name} is not a finite number")))
     }
+}
+
+/// A radius of the corners of a rect; `None` where it is that of the other axis: not stated, `auto`, or
+/// negative, which does not count (SVG 2, 7.4).
+pub(super) fn radius(node: &Node<'_, '_>, name: &str) -> Result<Option<f64>, OutlineError> {
+    if node.attribute(name).is_some_and(|text| text.trim() == "auto") {
+        return Ok(None);
+    }
+    Ok(user(node, name)?.filter(|radius| *radius >= 0.0))
 }
 
 /// From the drawing's own coordinates to mm, y up.
@@ -118,30 +130,67 @@ pub(super) fn map_of(
     let (x0, y0, h) = view.map_or((0.0, 0.0, None), |v| (v.x, v.y, Some(v.h)));
     let by_page = |size: Option<f64>, view: Option<f64>| size.zip(view).map(|(s, v)| s / v);
     let scales = [by_page(size(width), view.map(|v| v.w)), by_page(size(height), view.map(|v| v.h))];
-    let scale = match (options.scale, scales) {
-        (Some(scale), _) => scale,
-        (None, [Some(x), Some(y)]) if (x / y - 1.0).abs() > 1e-3 => {
-            return Err(fault(
-                root,
-                format!(
-                    "width and height stretch the viewBox by different amounts ({x:.5} and {y:.5} mm a unit)"
-                ),
-            ));
-        }
-        (None, [Some(scale), _] | [None, Some(scale)]) => scale,
-        (None, [None, None]) => PIXEL,
+    let (scales, margins) = match (options.scale, scales, view) {
+        (Some(scale), ..) => ([scale; 2], [0.0; 2]),
+        (None, [Some(x), Some(y)], Some(view)) => fitted(root, [x, y], view, notes)?,
+        (None, [Some(scale), _] | [None, Some(scale)], _) => ([scale; 2], [0.0; 2]),
+        (None, [None, None], _) => ([PIXEL; 2], [0.0; 2]),
     };
     let named = |l: Option<Length>| l.is_some_and(|l| !matches!(l.unit, LengthUnit::None | LengthUnit::Px));
     if options.scale.is_none() && !named(width) && !named(height) {
-        notes.push("the drawing has no unit; 96 of its units make an inch".into());
+        let inch = (25.4 / scales[0] * 1e4).round() / 1e4;
+        notes.push(format!("the drawing has no unit; {inch} of its units make an inch"));
     }
-    if !(scale > 0.0 && scale.is_finite()) {
+    if let Some(scale) = scales.into_iter().find(|scale| !(*scale > 0.0 && scale.is_finite())) {
         return Err(fault(root, format!("one unit of the drawing is {scale} mm")));
     }
-    let bottom = h.or_else(|| size(height).map(|mm| mm / scale)).unwrap_or(0.0);
+    let bottom = h.or_else(|| size(height).map(|mm| mm / scales[1])).unwrap_or(0.0);
     Ok(Map {
-        x: Vector2::new(scale, 0.0),
-        y: Vector2::new(0.0, -scale),
-        origin: Point2::new(-x0 * scale, (y0 + bottom) * scale),
+        x: Vector2::new(scales[0], 0.0),
+        y: Vector2::new(0.0, -scales[1]),
+        origin: Point2::new(margins[0] - x0 * scales[0], margins[1] + (y0 + bottom) * scales[1]),
     })
+}
+
+/// The mm of one unit along x and y, and the margins that are left beside and below a viewBox, where width and
+/// height alone would scale it by `scales`: as `preserveAspectRatio` says (SVG 2, 8.7).
+fn fitted(
+    root: &Node<'_, '_>,
+    scales: [f64; 2],
+    view: ViewBox,
+    notes: &mut Vec<String>,
+) -> Result<([f64; 2], [f64; 2]), OutlineError> {
+    let text = root.attribute("preserveAspectRatio").unwrap_or("xMidYMid");
+    let AspectRatio { align, slice, .. } =
+        text.parse().map_err(|e| fault(root, format!("preserveAspectRatio = \"{text}\": {e}")))?;
+    let [x, y] = scales;
+    let scale = if slice { x.max(y) } else { x.min(y) };
+    let is_told = (x - y).abs() * view.w.max(view.h) > ROUNDED;
+    let differ = format!("width and height scale the viewBox by {x:.7} and {y:.7} mm a unit");
+    // Shares of what is left that lie on the left and below.
+    let [left, below] = match align {
+        Align::None => {
+            if is_told {
+                notes.push(format!("{differ}; as its preserveAspectRatio says, it is stretched so"));
+            }
+            return Ok((scales, [0.0; 2]));
+        }
+        Align::XMinYMin => [0.0, 1.0],
+        Align::XMidYMin => [0.5, 1.0],
+        Align::XMaxYMin => [1.0, 1.0],
+        Align::XMinYMid => [0.0, 0.5],
+        Align::XMidYMid => [0.5, 0.5],
+        Align::XMaxYMid => [1.0, 0.5],
+        Align::XMinYMax => [0.0, 0.0],
+        Align::XMidYMax => [0.5, 0.0],
+        Align::XMaxYMax => [1.0, 0.0],
+    };
+    if slice && is_told {
+        let what = "preserveAspectRatio cuts it by a slice, which is not read";
+        return Err(fault(root, format!("{differ}, and its {what}; write a height that fits the width")));
+    }
+    if is_told {
+        notes.push(format!("{differ}; the smaller one holds, by its preserveAspectRatio"));
+    }
+    Ok(([scale; 2], [left * view.w * (x - scale), below * view.h * (y - scale)]))
 }

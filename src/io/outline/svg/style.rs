@@ -63,12 +63,20 @@ pub(super) struct Pens {
     stroke: bool,
     stroke_shows: bool,
     stroke_is_wide: bool,
+    /// Whether the fill is by `nonzero`, not `evenodd`.
+    pub fill_is_nonzero: bool,
 }
 
 impl Pens {
     /// Those of a drawing that names none.
-    pub const USUAL: Self =
-        Self { fill: true, fill_shows: true, stroke: false, stroke_shows: true, stroke_is_wide: true };
+    pub const USUAL: Self = Self {
+        fill: true,
+        fill_shows: true,
+        stroke: false,
+        stroke_shows: true,
+        stroke_is_wide: true,
+        fill_is_nonzero: true,
+    };
 
     pub fn within(self, node: &Node<'_, '_>) -> Result<Self, OutlineError> {
         let paints = |property: &str, usual: bool| match property_of(node, property).as_deref() {
@@ -85,18 +93,28 @@ impl Pens {
             None | Some("inherit") => self.stroke_is_wide,
             Some(width) => !width.parse::<Length>().is_ok_and(|width| width.number == 0.0),
         };
+        let fill_is_nonzero = match property_of(node, "fill-rule").as_deref() {
+            None | Some("inherit" | "unset") => self.fill_is_nonzero,
+            Some("nonzero" | "initial") => true,
+            Some("evenodd") => false,
+            Some(_) => return Err(fault(node, "its `fill-rule` is not read; write nonzero or evenodd")),
+        };
         Ok(Self {
             fill: paints("fill", self.fill),
             fill_shows: shows("fill-opacity", self.fill_shows)?,
             stroke: paints("stroke", self.stroke),
             stroke_shows: shows("stroke-opacity", self.stroke_shows)?,
             stroke_is_wide: is_wide,
+            fill_is_nonzero,
         })
     }
 
+    pub fn fill(self) -> bool {
+        self.fill && self.fill_shows
+    }
+
     pub fn draw(self, shape: &str) -> bool {
-        let fills = self.fill && self.fill_shows && shape != "line";
-        fills || (self.stroke && self.stroke_shows && self.stroke_is_wide)
+        (self.fill() && shape != "line") || (self.stroke && self.stroke_shows && self.stroke_is_wide)
     }
 }
 
@@ -112,15 +130,24 @@ fn without_comments(text: &str) -> String {
     bare
 }
 
-/// Refuses rules of a style sheet that shape or hide outlines: they are not applied. Says whether its rules
-/// set pens.
-pub(super) fn check_sheet(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
+/// What style sheets set: it is not applied, so that it is not known of shapes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sheets {
+    /// Which pens draw.
+    pub pens: bool,
+    /// What is filled.
+    pub fill: bool,
+    /// By which rule.
+    pub fill_rule: bool,
+}
+
+/// Refuses rules of a style sheet that shape or hide outlines: they are not applied. Adds what they set.
+pub(super) fn check_sheet(node: &Node<'_, '_>, sheets: &mut Sheets) -> Result<(), OutlineError> {
     let text: String = node.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
     let bare = without_comments(&text);
     if bare.contains("@import") {
         return Err(fault(node, "rules of other files are not read; save the drawing without them"));
     }
-    let mut has_pens = false;
     for block in bare.split('{').skip(1).filter_map(|block| block.split('}').next()) {
         let shaping = declarations(block).find(|(property, value)| {
             (is_any(property, &SHAPING) || is_any(property, &READ)) && !is_usual(property, value)
@@ -140,10 +167,12 @@ pub(super) fn check_sheet(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
                 ),
             ));
         }
-        has_pens |=
-            declarations(block).any(|(property, _)| is_any(property, &["fill", "stroke", "stroke-width"]));
+        let sets = |of: &[&str]| declarations(block).any(|(property, _)| is_any(property, of));
+        sheets.pens |= sets(&["fill", "stroke", "stroke-width"]);
+        sheets.fill |= sets(&["fill"]);
+        sheets.fill_rule |= sets(&["fill-rule"]);
     }
-    Ok(has_pens)
+    Ok(())
 }
 
 /// Properties and values of a list of declarations.
