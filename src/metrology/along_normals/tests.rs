@@ -112,7 +112,7 @@ fn a_look_at_ridges_alone_finds_their_heights_and_what_stands_along_borders() {
             asked,
             most_divided: 0,
         };
-        let map = along.ridges(&net, &vec![true; net.places.len()], &Silent).unwrap();
+        let map = along.ridges(&net, &Silent).unwrap();
         let (max, p50) = (map.scallop.max_mm.unwrap(), map.scallop.p50_mm.unwrap());
         assert!((max / sagitta(0.25) - 1.0).abs() < 0.01, "{max} {}", sagitta(0.25));
         assert!((p50 / sagitta(0.25) - 1.0).abs() < 0.01, "{p50}");
