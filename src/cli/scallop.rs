@@ -425,6 +425,10 @@ mod tests {
         assert!(refused("--cutter flat:6 --step 0.5").contains("give it a lead"));
         assert!(refused("--cutter ball:6 --step -1").contains("positive number"));
         assert!(refused("--cutter ball:6 --step 0.5 --convex 0").contains("radius of the section"));
+        assert!(
+            refused("--cutter ball:6 --step 0.5 --convex 0.01").contains("reaches across 0.02979 mm there")
+        );
+        assert!(refused("--cutter ball:6 --table --spread 400").contains("in degrees, is 400;"));
         assert!(refused("--cutter ball:6 --step 0.5 --part none.stl --at 1,2").contains("none.stl"));
         assert!(
             refused("--cutter ball:6 --step 0.5 --part none.step --at 1,2")

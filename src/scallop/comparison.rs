@@ -48,8 +48,10 @@ pub fn compare(
     degree: usize,
 ) -> Result<Vec<Comparison>, ScallopError> {
     if !(0.0..std::f64::consts::FRAC_PI_4).contains(&angle) {
-        let wanted = "an angle from 0 to 45 degrees, in rad";
-        return Err(ScallopError::Range { what: "the angle of neighbouring passes", value: angle, wanted });
+        // Without the last digits, which are those of the radians.
+        let value = (angle.to_degrees() * 1e9).round() / 1e9;
+        let what = "the angle of neighbouring passes, in degrees,";
+        return Err(ScallopError::Range { what, value, wanted: "from 0 to less than 45" });
     }
     let mut rows = Vec::new();
     for &curvature in curvatures {

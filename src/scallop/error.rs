@@ -42,7 +42,7 @@ pub enum ScallopError {
     /// The two passes leave untouched material between them.
     #[error(
         "passes {step} mm apart leave material that no pass touches: a ball of radius {ball} mm reaches across \
-         {greatest} mm there; choose a smaller step"
+         {} mm there; choose a smaller step", digits(*greatest)
     )]
     Step {
         /// The step along the surface, mm.
@@ -55,7 +55,7 @@ pub enum ScallopError {
     /// No step leaves so high a ridge.
     #[error(
         "no step leaves a scallop of {height} mm there: the highest that a ball of radius {ball} mm leaves is \
-         {greatest} mm; ask for less"
+         {} mm; ask for less", digits(*greatest)
     )]
     Height {
         /// The height, mm.
@@ -90,6 +90,12 @@ pub enum ScallopError {
         /// Radius of the ball, mm.
         ball: f64,
     },
+}
+
+/// Four digits that count.
+fn digits(value: f64) -> String {
+    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$}")
 }
 
 /// `value`, if it is finite and above zero.
