@@ -104,6 +104,9 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     Ok(all)
 }
 
+/// What a function is whose levels run along the borders around holes.
+const ALONG_BORDERS: &str = "stream function, along borders";
+
 fn on_piece(
     task: &Task<'_>,
     aim: Aim,
@@ -139,7 +142,7 @@ fn on_piece(
             let lines = lines.transpose()?;
             let quickest = toward.is_none() && objective == Objective::Time;
             let around = quickest.then(|| along_borders(task, piece, surface)).flatten();
-            let mut found = shortest_streams(surface, task, lines.as_deref(), around, objective)?;
+            let mut found = shortest_streams(surface, task, lines.as_deref(), around.clone(), objective)?;
             if quickest {
                 // What the least length promises may still take less time.
                 found.extend(shortest_streams(surface, task, None, None, Objective::Length)?);
@@ -150,7 +153,12 @@ fn on_piece(
                 let function = LevelFunction::Mesh(found.coefficients.into());
                 Levelled { function, planned_as: SEARCHED.into(), told }
             };
-            found.into_iter().map(levelled).collect()
+            let along_borders = around.map(|values| {
+                let function = LevelFunction::Mesh(surface.continued(values).into());
+                Levelled { function, planned_as: ALONG_BORDERS.into(), told: None }
+            });
+            // Where a search leads away from them, its levels may still take more time than promised.
+            found.into_iter().map(levelled).chain(along_borders).collect()
         }
     };
     let mut best: Option<(f64, Passes)> = None;

@@ -517,6 +517,7 @@ mod tests {
     use crate::plan::{Plan, plan};
     use crate::vocabulary::{Joining, Links, PlanSettings};
     use field::LineSample;
+    use field::mesh::Sense;
     use geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
     use part::{Part, Patch};
     use std::sync::Arc;
@@ -670,6 +671,50 @@ mod tests {
         println!("{closed} of {} close, {length} {least} {:?}", passes.len(), plan.notes);
         assert!(closed == passes.len() && closed > 5, "{closed} of {}", passes.len());
         assert!(length > least && length < 1.1 * least, "{length} {least}");
+    }
+
+    /// A ring with chamfers of 40 degrees, from 13 to 21 mm of radius.
+    fn bezel() -> Part {
+        const AROUND: u32 = 160;
+        let outline =
+            [[13.3, 0.0], [14.15, 0.75], [15.0, 1.5], [17.5, 1.5], [20.0, 1.5], [20.9, 0.75], [21.8, 0.0]];
+        let point = |k: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND)).sin_cos();
+            let [radius, z] = outline[(k / AROUND) as usize];
+            Point3::new(radius * cos, radius * sin, z)
+        };
+        let square = |k: u32| {
+            let next = k / AROUND * AROUND + (k + 1) % AROUND;
+            [[k, k + AROUND, next + AROUND], [k, next + AROUND, next]]
+        };
+        let rings = outline.len() as u32;
+        let points = (0..AROUND * rings).map(point).collect();
+        let triangles = (0..AROUND * (rings - 1)).flat_map(square).collect();
+        Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
+    }
+
+    /// Passes around the hole of a bezel are taken where the search leads to others that take longer.
+    #[test]
+    fn on_a_bezel_no_plan_takes_longer_than_passes_along_its_borders() {
+        let part = bezel();
+        let cutter = Cutter::ball(4.0).unwrap();
+        let settings = PlanSettings {
+            step: Step::Scallop(0.03),
+            stock_top: part.bounds().max.z + 1.0,
+            joining: Joining { links: Links::Surface, ..Joining::default() },
+            ..PlanSettings::default()
+        };
+        let time_of = |strategy: &dyn Strategy| {
+            let plan = plan(&part, &cutter, strategy, &settings, &Silent).unwrap();
+            println!("{:?}", plan.notes);
+            let path = machine::slow_corners(&plan.path, &settings.machine);
+            machine::machining_time(&path, &settings.machine, &Silent).unwrap()
+        };
+        let along = Streamline::along(FeedDirection::Border(Sense::Along));
+        let quickest = ShortestStreamline { toward: None, objective: Objective::Time };
+        let [along, quickest] = [&along as &dyn Strategy, &quickest].map(time_of);
+        println!("{along} {quickest}");
+        assert!(quickest <= 1.001 * along, "{quickest} s for {along}");
     }
 
     /// Vectors that have a stream function are followed as closely as the published fit does where their
