@@ -138,7 +138,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
                 format!("{:.1} s ({:.1} % of the machining time)", s.least_time_s, 100.0 * s.time_efficiency),
             ),
             (
-                "least links between as many passes",
+                "least links between its passes",
                 format!("{:.1} s (with them {:.1} %)", s.least_links_s, 100.0 * s.joined_efficiency),
             ),
         ],

@@ -414,7 +414,7 @@ struct Stretch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{Faces, Pace};
+    use crate::vocabulary::Pace;
     use field::GridField;
     use geometry::{AnalyticShape, AnalyticSurface, distance_to_segment};
     use part::{Part, Patch};
@@ -429,17 +429,7 @@ mod tests {
         let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-SIDE, SIDE]; 2]).unwrap();
         let part = Part::from_patches(vec![Patch::Analytic(plane)], 0.002).unwrap();
         let cutter = Cutter::ball(6.0).unwrap();
-        let settings = PassSettings {
-            step: Step::Stepover(1.0),
-            sampling: 0.3,
-            chord_tolerance: 0.001,
-            smoothing: None,
-            axis: None,
-            faces: Faces::ALL,
-            memory: u64::MAX,
-            earlier: None,
-            probe: None,
-        };
+        let settings = PassSettings::upright(Step::Stepover(1.0), 0.3);
         let pace = Pace { duration: &|passes, _| Ok(passes.length()), link: 1.0, bend: 0.1 };
         let task = Task { part: &part, cutter: &cutter, settings, wants_mesh: false, pace, monitor: &Silent };
         const CELLS: usize = 200;

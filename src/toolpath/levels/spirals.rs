@@ -181,7 +181,7 @@ fn moves(task: &Task<'_>, drop: &DropCutter<'_>, way: &[Point2]) -> Result<Vec<P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{Faces, Pace, PassSettings, Step};
+    use crate::vocabulary::{Pace, PassSettings, Step};
     use cutter::Cutter;
     use geometry::{AnalyticShape, AnalyticSurface, CurveSegment};
     use part::{Part, Patch};
@@ -206,17 +206,7 @@ mod tests {
         let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-12.0, 12.0]; 2]).unwrap();
         let part = Part::from_patches(vec![Patch::Analytic(plane)], 0.002).unwrap();
         let cutter = Cutter::ball(6.0).unwrap();
-        let settings = PassSettings {
-            step: Step::Stepover(1.0),
-            sampling: 0.3,
-            chord_tolerance: 0.001,
-            smoothing: None,
-            axis: None,
-            faces: Faces::ALL,
-            memory: u64::MAX,
-            earlier: None,
-            probe: None,
-        };
+        let settings = PassSettings::upright(Step::Stepover(1.0), 0.3);
         // By length, and so much for each link.
         let duration = |passes: &Passes, _| Ok(passes.length() + link * (passes.passes.len() - 1) as f64);
         let pace = Pace { duration: &duration, link, bend: 0.1 };

@@ -374,7 +374,7 @@ pub(crate) fn predicted_length(
 mod tests {
     use super::*;
     use crate::levels::spacing::{LevelSteps, place_levels, places_of};
-    use crate::vocabulary::{Faces, PassSettings};
+    use crate::vocabulary::PassSettings;
     use field::LevelTracer;
     use geometry::{NurbsSurface, Point3};
     use part::{Part, Patch};
@@ -397,17 +397,7 @@ mod tests {
     #[test]
     fn passes_around_a_half_cylinder_are_eight_half_circles_long() {
         let (part, cutter) = (half_cylinder(), Cutter::ball(10.0).unwrap());
-        let settings = PassSettings {
-            step: Step::Scallop(0.05),
-            sampling: 0.5,
-            chord_tolerance: 1e-3,
-            smoothing: None,
-            axis: None,
-            faces: Faces::ALL,
-            memory: 1 << 30,
-            earlier: None,
-            probe: None,
-        };
+        let settings = PassSettings::upright(Step::Scallop(0.05), 0.5);
         let chart = &Chart::all(&part, &cutter, crate::vocabulary::Guide::default()).unwrap()[0];
         let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];
         let field = arrival(chart, &cutter, settings.step, &border, false, &Silent).unwrap();

@@ -477,6 +477,9 @@ impl MeshGuide<'_> {
         let (Some(first), Some(last)) = (stretches.iter().position(own), stretches.iter().rposition(own))
         else {
             let serves = |p: &MeshPoint| self.serves(p);
+            if curve.closed {
+                return if curve.points.iter().all(serves) { knots } else { Vec::new() };
+            }
             let (first, last) = (curve.points.iter().position(serves), curve.points.iter().rposition(serves));
             let served = first.zip(last).filter(|(first, last)| first < last);
             return served.map_or_else(Vec::new, |(k, l)| knots[knot_of[k]..=knot_of[l]].to_vec());

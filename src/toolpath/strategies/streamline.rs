@@ -599,12 +599,7 @@ mod tests {
             |x: f64| Patch::Analytic(AnalyticSurface::new(shape, [[x, x + 6.0], [-4.0, 4.0]]).unwrap());
         let part = Part::from_patches(vec![patch(-6.0), patch(0.0)], 0.002).unwrap();
         let cutter = Cutter::ball(6.0).unwrap();
-        let settings = PlanSettings {
-            step: Step::Scallop(0.02),
-            stock_top: part.bounds().max.z + 1.0,
-            joining: Joining { links: Links::Surface, ..Joining::default() },
-            ..PlanSettings::default()
-        };
+        let settings = joined_on_the_surface(&part, 0.02);
         let machine = &machine::Machine { jerks: [f64::INFINITY; 3], ..settings.machine };
         let [time, length] = [Objective::Time, Objective::Length].map(|objective| {
             let strategy = ShortestStreamline { toward: None, objective };
@@ -617,22 +612,37 @@ mod tests {
         assert!(time <= length * (1.0 + 1e-9), "{time} {length}");
     }
 
-    /// A bowl around a hole, from 6 to 12 mm of radius; `bend` is that of its meridian, 1/mm.
-    fn ring(bend: f64) -> Part {
-        const AROUND: u32 = 120;
-        let (inner, rings) = (6.0, 15);
+    /// The mesh that a section of radii and heights makes around z.
+    fn revolved(section: &[[f64; 2]], around: u32) -> Part {
         let point = |k: u32| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND)).sin_cos();
-            let radius = inner * (1.0 + f64::from(k / AROUND) / f64::from(rings));
-            Point3::new(radius * cos, radius * sin, 0.5 * bend * radius * radius)
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
+            let [radius, z] = section[(k / around) as usize];
+            Point3::new(radius * cos, radius * sin, z)
         };
         let square = |k: u32| {
-            let next = k / AROUND * AROUND + (k + 1) % AROUND;
-            [[k, k + AROUND, next + AROUND], [k, next + AROUND, next]]
+            let next = k / around * around + (k + 1) % around;
+            [[k, k + around, next + around], [k, next + around, next]]
         };
-        let points = (0..AROUND * (rings + 1)).map(point).collect();
-        let triangles = (0..AROUND * rings).flat_map(square).collect();
+        let rows = section.len() as u32;
+        let points = (0..around * rows).map(point).collect();
+        let triangles = (0..around * (rows - 1)).flat_map(square).collect();
         Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
+    }
+
+    /// A bowl around a hole, from 6 to 12 mm of radius; `bend` is that of its meridian, 1/mm.
+    fn ring(bend: f64) -> Part {
+        let radii = (0..=15).map(|k| 6.0 + 0.4 * f64::from(k));
+        revolved(&radii.map(|radius| [radius, 0.5 * bend * radius * radius]).collect::<Vec<_>>(), 120)
+    }
+
+    /// For passes below a scallop height, joined on the surface.
+    fn joined_on_the_surface(part: &Part, height: f64) -> PlanSettings {
+        PlanSettings {
+            step: Step::Scallop(height),
+            stock_top: part.bounds().max.z + 1.0,
+            joining: Joining { links: Links::Surface, ..Joining::default() },
+            ..PlanSettings::default()
+        }
     }
 
     /// The bound of a ring is that of its own area, and not of the rectangle around it; so is that of a plate
@@ -656,12 +666,7 @@ mod tests {
     fn around_a_hole_the_quickest_passes_close() {
         let part = ring(0.0);
         let cutter = Cutter::ball(6.0).unwrap();
-        let settings = PlanSettings {
-            step: Step::Scallop(0.02),
-            stock_top: part.bounds().max.z + 1.0,
-            joining: Joining { links: Links::Surface, ..Joining::default() },
-            ..PlanSettings::default()
-        };
+        let settings = joined_on_the_surface(&part, 0.02);
         let time = ShortestStreamline { toward: None, objective: Objective::Time };
         let plan = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
         let passes = &plan.kept.passes;
@@ -673,40 +678,16 @@ mod tests {
         assert!(length > least && length < 1.1 * least, "{length} {least}");
     }
 
-    /// A ring with chamfers of 40 degrees, from 13 to 21 mm of radius.
-    fn bezel() -> Part {
-        const AROUND: u32 = 160;
-        let outline =
-            [[13.3, 0.0], [14.15, 0.75], [15.0, 1.5], [17.5, 1.5], [20.0, 1.5], [20.9, 0.75], [21.8, 0.0]];
-        let point = |k: u32| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND)).sin_cos();
-            let [radius, z] = outline[(k / AROUND) as usize];
-            Point3::new(radius * cos, radius * sin, z)
-        };
-        let square = |k: u32| {
-            let next = k / AROUND * AROUND + (k + 1) % AROUND;
-            [[k, k + AROUND, next + AROUND], [k, next + AROUND, next]]
-        };
-        let rings = outline.len() as u32;
-        let points = (0..AROUND * rings).map(point).collect();
-        let triangles = (0..AROUND * (rings - 1)).flat_map(square).collect();
-        Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
-    }
-
     /// Passes around the hole of a bezel are taken where the search leads to others that take longer.
     #[test]
     fn on_a_bezel_no_plan_takes_longer_than_passes_along_its_borders() {
-        let part = bezel();
-        let cutter = Cutter::ball(4.0).unwrap();
-        let settings = PlanSettings {
-            step: Step::Scallop(0.03),
-            stock_top: part.bounds().max.z + 1.0,
-            joining: Joining { links: Links::Surface, ..Joining::default() },
-            ..PlanSettings::default()
-        };
+        // Its chamfers have 40 degrees.
+        let section =
+            [[13.3, 0.0], [14.15, 0.75], [15.0, 1.5], [17.5, 1.5], [20.0, 1.5], [20.9, 0.75], [21.8, 0.0]];
+        let part = revolved(&section, 160);
+        let (cutter, settings) = (Cutter::ball(4.0).unwrap(), joined_on_the_surface(&part, 0.03));
         let time_of = |strategy: &dyn Strategy| {
             let plan = plan(&part, &cutter, strategy, &settings, &Silent).unwrap();
-            println!("{:?}", plan.notes);
             let path = machine::slow_corners(&plan.path, &settings.machine);
             machine::machining_time(&path, &settings.machine, &Silent).unwrap()
         };

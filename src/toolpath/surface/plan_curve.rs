@@ -233,7 +233,7 @@ impl PlanCurves<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{Faces, SAMPLING_OVER_RADIUS, Step};
+    use crate::vocabulary::{SAMPLING_OVER_RADIUS, Step};
     use geometry::TriangleMesh;
     use part::Part;
     use work::monitor::Silent;
@@ -251,17 +251,7 @@ mod tests {
         let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
         let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
         let cutter = Cutter::ball(2.0 * radius).unwrap();
-        let settings = PassSettings {
-            step: Step::Stepover(0.5),
-            sampling: SAMPLING_OVER_RADIUS * radius,
-            chord_tolerance: 1e-3,
-            smoothing: None,
-            axis: None,
-            faces: Faces::ALL,
-            memory: 1 << 30,
-            earlier: None,
-            probe: None,
-        };
+        let settings = PassSettings::upright(Step::Stepover(0.5), SAMPLING_OVER_RADIUS * radius);
         let curves = PlanCurves {
             drop: &DropCutter::new(&part, &cutter),
             border: &Border::of(&part),

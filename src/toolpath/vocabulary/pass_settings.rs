@@ -80,6 +80,22 @@ pub struct PassSettings<'a> {
 }
 
 impl<'a> PassSettings<'a> {
+    /// Those of most tests: an upright cutter on all faces, chords of a micrometre.
+    #[cfg(test)]
+    pub const fn upright(step: Step, sampling: f64) -> Self {
+        Self {
+            step,
+            sampling,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+            faces: Faces::ALL,
+            memory: 1 << 30,
+            earlier: None,
+            probe: None,
+        }
+    }
+
     /// What widths of strips go by.
     pub fn guide(&self) -> Guide<'a> {
         Guide { axis: self.axis, correction: self.earlier.map(|earlier| &earlier.correction) }
@@ -181,17 +197,7 @@ mod tests {
             drop.at(x, y).map(|drop| Point3::new(x, y, drop.tip_z))
         };
         assert!(tip(1.2).is_none() && tip(1.0).is_some() && tip(2.0).is_some());
-        let settings = PassSettings {
-            step: Step::Stepover(0.5),
-            sampling: 1.0,
-            chord_tolerance: 1e-3,
-            smoothing: None,
-            axis: None,
-            faces: Faces::ALL,
-            memory: 1 << 30,
-            earlier: None,
-            probe: None,
-        };
+        let settings = PassSettings::upright(Step::Stepover(0.5), 1.0);
         let moves = settings.moves_by_contacts([0.0, 3.0], &mut tip, &drop, &Silent).unwrap();
         let lowest_at_corner = moves
             .windows(2)

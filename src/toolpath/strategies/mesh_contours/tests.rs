@@ -7,17 +7,7 @@ const CHORD: f64 = 1e-3;
 const TOP: f64 = 9.0;
 
 fn planned(part: &Part, cutter: &Cutter, step: Step, placing: LevelSteps) -> Result<Passes, PlanError> {
-    let settings = PassSettings {
-        step,
-        sampling: 0.5,
-        chord_tolerance: CHORD,
-        smoothing: None,
-        axis: None,
-        faces: Faces::ALL,
-        memory: 1 << 30,
-        earlier: None,
-        probe: None,
-    };
+    let settings = PassSettings::upright(step, 0.5);
     let pace = Pace { duration: &|passes, _| Ok(passes.length()), link: 1.0, bend: 0.1 };
     passes(&Task { part, cutter, settings, wants_mesh: true, pace, monitor: &Silent }, placing)
 }

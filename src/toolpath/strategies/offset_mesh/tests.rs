@@ -1,5 +1,5 @@
 use super::*;
-use crate::vocabulary::{Faces, Pace};
+use crate::vocabulary::Pace;
 use geometry::TriangleMesh;
 use std::f64::consts::FRAC_PI_2;
 use work::monitor::Silent;
@@ -7,17 +7,7 @@ use work::monitor::Silent;
 const RADIUS: f64 = 3.0;
 const TARGET: f64 = 0.02;
 
-const SETTINGS: PassSettings = PassSettings {
-    step: Step::Scallop(TARGET),
-    sampling: 0.5,
-    chord_tolerance: 1e-3,
-    smoothing: None,
-    axis: None,
-    faces: Faces::ALL,
-    memory: 1 << 30,
-    earlier: None,
-    probe: None,
-};
+const SETTINGS: PassSettings = PassSettings::upright(Step::Scallop(TARGET), 0.5);
 
 /// Points are put half way to where chords of 1 µm cut short.
 const SHORT: f64 = 5e-4;
