@@ -151,9 +151,9 @@ impl Finder<'_> {
         let steepest = rise_over(&a, &a, &b).abs().max(rise_over(&b, &a, &b).abs());
         // Beside a wall one track ends: the ridge is the higher edge.
         let smooth = x >= 0.0 && x <= rest && (height - top).abs() <= steepest * rest + 1e-9;
-        // Tangents of cuts that nearly hold the normal meet anywhere; no hit was looked for beyond the
-        // engine's reach.
-        let smooth = smooth && height <= top.max(self.engine.reach());
+        // Tangents of cuts that nearly hold the normal meet anywhere; no hit was looked for farther out or
+        // deeper than the engine tells.
+        let smooth = smooth && height >= -self.engine.depth() && height <= top.max(self.engine.reach());
         let place = from.towards(to, if smooth { a.t + x } else { 0.5 * (a.t + b.t) }, self.part);
         let height = if smooth { height } else { top };
         let along: Vector3 = a.hit.normal.cross(&b.hit.normal);

@@ -586,3 +586,36 @@ fn the_two_moves_that_meet_tell_the_ridges_that_all_moves_do() {
         assert!(few * 3 < many, "{few} {many}");
     }
 }
+
+/// Two passes that meet in the middle of a place's way, as deep as is looked, where both nearly hold the normal.
+struct Flanks;
+
+impl AlongNormal for Flanks {
+    fn hit(&self, point: &Point3, _: &Vector3, _: Option<&NormalHit>) -> Option<NormalHit> {
+        let (by, aside) = if point.x < 0.5 { (0, 1.0) } else { (2, -1.0) };
+        let normal = Vector3::new(aside, 0.0, 1e-7).normalize();
+        Some(NormalHit { way: Way::Normal, deviation: -self.depth(), by, normal, seed: 0, uncertain: 0.0 })
+    }
+
+    fn reach(&self) -> f64 {
+        0.5
+    }
+
+    fn depth(&self) -> f64 {
+        1.0
+    }
+}
+
+#[test]
+fn no_ridge_is_told_deeper_than_is_looked() {
+    let part = plane([1.0, 1.0]);
+    let path = path(&passes(0.0));
+    let tracks = Tracks::new(&path, Cutter::ball(2.0 * RADIUS).unwrap());
+    let finder = Finder { part: &part, engine: &Flanks, tracks: &tracks, radius: RADIUS, close: CLOSE };
+    let place = |x: f64| NetPlace::at_foot(&part.closest_point(&Point3::new(x, 0.5, 0.0)).0);
+    let with_hit = |at: &NetPlace| Flanks.hit(&at.point, &at.normal, None).unwrap();
+    let [from, to] = [place(0.2), place(0.8)];
+    let mut found = Vec::new();
+    finder.between((&from, with_hit(&from)), (&to, with_hit(&to)), &mut found);
+    assert!(!found.is_empty() && found.iter().all(|c| c.height >= -1.0), "{found:?}");
+}
