@@ -13,6 +13,8 @@
 //! left of the part is nearer than that, however long the way along the normal is beside a steep flank. Such
 //! a place counts as deep as that is near: as far as the way inward along the design is to where it is left.
 
+mod along_piece;
+
 use std::collections::HashMap;
 
 use super::cut_surface::CutSurface;
@@ -33,9 +35,6 @@ const INSIDE_HALVINGS: usize = 24;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
-
-/// Halvings of a piece at most: to a millionth of it.
-const MOST_HALVINGS: u32 = 20;
 
 /// A piece of the border that is straight, or nearly: on a patch the piece of a curve, its ends on it.
 pub(super) struct BorderPiece {
@@ -58,15 +57,6 @@ struct BorderCut {
     possible: f64,
     at: Point3,
     by: u32,
-}
-
-/// How deep a move cuts at a place of a border, mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct PlaceDepth {
-    /// Along the normal or the wall.
-    along: f64,
-    /// Whether the move cuts nothing as far inside of all borders as counts as near.
-    is_left: bool,
 }
 
 /// The design at a share of the side of a triangle, whose ends have parameters on a patch, and the normal
@@ -324,124 +314,6 @@ impl Inspection<'_> {
         });
         let all = (within(least_way(far, |way| is_left(&within, way))) - place).norm();
         Some(lengths.fold(all, f64::min))
-    }
-
-    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a
-    /// share.
-    fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
-        let design = |share: f64| piece.design(self.part, share);
-        let length = (piece.ends[1] - piece.ends[0]).norm();
-        let far = self.limits.gouge;
-        let end = |far: f64| piece.end(far);
-        let inward = |share: f64, far: f64| piece.inward_by(share, far);
-        let within = |share: f64, far: f64| design(share).0 + inward(share, far);
-        let value = |share: f64| {
-            let (place, normal) = design(share);
-            let is_left = self.is_left(by, &within(share, far));
-            let mut along = depth(self.surface, by, &place, &normal)?;
-            if along.is_infinite() || piece.leads_out(&normal) {
-                along = along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?);
-            }
-            Some(PlaceDepth { along, is_left })
-        };
-        let near = |share: f64| self.near_left(piece, by, share, &design(share).0);
-        // On a ridge the cut may be less deep than along the normal.
-        let on_ridge = |share: f64, along: f64| {
-            let (place, normal) = design(share);
-            // The cells may end with the part.
-            self.on_ridge(&(place + piece.inward * NUMERICAL_FLOOR), &normal, along)
-        };
-        let least = self.limits.shallow();
-        // What a border bends by between two places spoils concavity by as much; it falls with the square of
-        // their distance.
-        let bend = 3.0 * piece.bend;
-        let mut best: Option<(f64, f64)> = None;
-        let mut left = f64::NEG_INFINITY;
-        let shares = [0.0, nearest, 1.0];
-        let values = shares.map(value);
-        let mut open: Vec<_> =
-            (0..2).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
-        // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
-        let mut keep = |share: f64, found: Option<PlaceDepth>| {
-            let most = best.map_or(known, |(most, _)| most.max(known));
-            let Some(PlaceDepth { mut along, is_left }) = found else { return (most, None) };
-            if is_left && along > most {
-                along = near(share).map_or(along, |near| near.min(along));
-            }
-            if along > most && along.is_finite() {
-                let (place, normal) = design(share);
-                // Within the part, which ends there.
-                let place = place + inward(share, NUMERICAL_FLOOR);
-                along = self.counted(&place, &normal, along, by).map_or(along, |counted| counted.min(along));
-            }
-            let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
-            let depth = ridge.map_or(along, |cut| -cut.distance);
-            if best.is_none_or(|(most, _)| depth > most) {
-                best = Some((depth, share));
-            }
-            (most.max(depth), ridge)
-        };
-        shares.iter().zip(values).for_each(|(share, found)| {
-            keep(*share, found);
-        });
-        while let Some((a, at_a, b, at_b, halvings)) = open.pop() {
-            if at_a.is_none() && at_b.is_none() || b <= a {
-                continue;
-            }
-            let m = 0.5 * (a + b);
-            let at_m = value(m);
-            let (most, ridge) = keep(m, at_m);
-            let possible = match (at_a, at_m, at_b) {
-                (Some(at_a), Some(at_m), Some(at_b)) => {
-                    // Near an end the inside is that of another place.
-                    let is_kinked =
-                        |far: f64| [end(far), 1.0 - end(far)].iter().any(|place| a < *place && *place < b);
-                    let bend = bend * (b - a) * (b - a);
-                    let along = concave_most([at_a.along, at_m.along, at_b.along]) + bend;
-                    let is_left = |far: f64| {
-                        !is_kinked(far) && self.stays_left(by, [a, m, b].map(|s| within(s, far)), bend)
-                    };
-                    if along > most && is_left(far) {
-                        let far = least_way(far, is_left);
-                        let ways = [a, b].map(|share| inward(share, far).norm());
-                        // What is near one place is no farther from another than they are from each other.
-                        let aside = 0.5 * (b - a) * length + bend;
-                        let nearby = near(m).map_or(f64::INFINITY, |near| near + aside);
-                        along.min(ways.into_iter().fold(0.0, f64::max)).min(nearby)
-                    } else {
-                        along
-                    }
-                }
-                (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
-                _ => f64::INFINITY,
-            };
-            let possible = ridge.map_or(possible, |cut| {
-                let within = 0.5 * (b - a) * length + piece.bend;
-                possible.min(cut.slope * within - cut.distance)
-            });
-            if possible <= most + NUMERICAL_FLOOR {
-                left = left.max(possible);
-            } else if halvings == 0 {
-                left = left.max(most + NUMERICAL_FLOOR);
-            } else {
-                open.push((a, at_a, m, at_m, halvings - 1));
-                open.push((m, at_m, b, at_b, halvings - 1));
-            }
-        }
-        let (found, share) = best?;
-        let possible = left.max(found);
-        if possible <= known {
-            return None;
-        }
-        let (point, normal) = design(share);
-        // What lies under something else is not seen from above.
-        let seen = point + inward(share, self.limits.gouge);
-        let top = self.part.highest_at(seen.x, seen.y)?;
-        if (top.point - point).dot(&normal) > self.limits.gouge / normal.z.max(LEAST_FACING) {
-            return None;
-        }
-        let of_walls = |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&point, -depth.max(0.0)));
-        Some(BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by })
     }
 }
 

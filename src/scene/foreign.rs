@@ -61,18 +61,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let read = if is_apt {
         read_apt(&name, &bytes)
     } else {
-        let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
-        let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
-        let any_radius = table.tools.is_empty().then(|| scene.tooling.cutter.radius());
-        let longest = lengths.values().copied().fold(0.0, f64::max);
-        let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
-        match read_gcode(&name, &bytes, control, &setup) {
-            Ok(read) if !setup.offsets_known && read.highest() + longest > MACHINE_ZERO_ABOVE => {
-                let above = Setup::from_above(MACHINE_ZERO_ABOVE + read.highest() + longest);
-                read_gcode(&name, &bytes, control, &Setup { work: above.work, ..setup })
-            }
-            read => read,
-        }
+        read_with_lengths((&name, &bytes), control, &table, &lengths, scene)
     };
     let read = read.map_err(refused)?;
     // Where the machine is known, so are its axes' limits: no assumed place may leave them.
@@ -86,61 +75,69 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let said = Described::of(&read);
     let described = if table.tools.is_empty() { said.table.clone() } else { table };
     let (mut findings, mut notes) = (read.findings(&length), notes(&read));
-    let gauge_lengths = lengths.clone();
-    let straight_rapids = control.straight_rapids.filter(|_| !is_apt);
+    let (only, runs, others) = if foreign.tools_meant == ToolsMeant::All {
+        (None, known(&read, runs, &described, &said).map_err(refused)?, Others::default())
+    } else {
+        let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
+        let others = Others::of(&runs, tool, &described);
+        findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
+        (Some(tool), runs.into_iter().filter(|run| run.tool == tool).collect(), others)
+    };
+    let (path, joints) = joined(runs.into_iter());
+    let tools = if only.is_none() { tools_of(&path, &described) } else { None };
+    match only {
+        Some(tool) => told_otherwise(&said, tool, &scene.tooling.cutter, &read.name, &mut notes),
+        None => {
+            let is_used = |number| path.origin.tools.iter().any(|(_, used)| *used == number);
+            let measured = described.tools.iter().filter(|tool| is_used(tool.number));
+            measured
+                .for_each(|tool| told_otherwise(&said, tool.number, &tool.cutter, &read.name, &mut notes));
+        }
+    }
     let table_zero = kinematics.map_or([0.0; 2], |kinematics| {
         kinematics.axes().map(|axis| match axis.side {
             Side::Head => 0.0,
             Side::Table => read.zero[3 + usize::from(axis.letter as u8 - b'A').min(2)].to_radians(),
         })
     });
-    let read = if foreign.tools_meant == ToolsMeant::All {
-        let (path, joints) = joined(known(&read, runs, &described, &said).map_err(refused)?.into_iter());
-        let tools = tools_of(&path, &described);
-        let measured = described
-            .tools
-            .iter()
-            .filter(|tool| path.origin.tools.iter().any(|(_, used)| *used == tool.number));
-        measured.for_each(|tool| told_otherwise(&said, tool.number, &tool.cutter, &read.name, &mut notes));
-        let before = Vec::new();
-        let (unknown_before, others) = (false, false);
-        ReadProgram {
-            path,
-            joints,
-            table_zero,
-            straight_rapids,
-            tools,
-            gauge_lengths,
-            before,
-            unknown_before,
-            others,
-            highest_feed: read.highest_feed(|_| true),
-            findings,
-            notes,
-        }
-    } else {
-        let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
-        told_otherwise(&said, tool, &scene.tooling.cutter, &read.name, &mut notes);
-        let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
-        let (path, joints) = joined(runs.into_iter().filter(|run| run.tool == tool));
-        findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
-        ReadProgram {
-            path,
-            joints,
-            table_zero,
-            straight_rapids,
-            tools: None,
-            gauge_lengths,
-            before,
-            unknown_before,
-            others: any,
-            highest_feed: read.highest_feed(|of| of == tool),
-            findings,
-            notes,
-        }
+    let program = ReadProgram {
+        path,
+        joints,
+        table_zero,
+        straight_rapids: control.straight_rapids.filter(|_| !is_apt),
+        tools,
+        gauge_lengths: lengths.clone(),
+        before: others.before,
+        unknown_before: others.unknown_before,
+        others: others.any,
+        highest_feed: read.highest_feed(|of| only.is_none_or(|tool| of == tool)),
+        findings,
+        notes,
     };
-    request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
+    request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(program)), ..foreign.clone() });
     Ok(())
+}
+
+/// Reads G-code with the lengths and radii of a table of tools, from above all of it where the machine's zero
+/// is not known.
+fn read_with_lengths(
+    (name, bytes): (&str, &[u8]),
+    control: &'static Control,
+    table: &ToolTable,
+    lengths: &BTreeMap<u32, f64>,
+    scene: &Scene,
+) -> Result<Program, ProgramError> {
+    let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
+    let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
+    let any_radius = table.tools.is_empty().then(|| scene.tooling.cutter.radius());
+    let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
+    let read = read_gcode(name, bytes, control, &setup)?;
+    let longest = lengths.values().copied().fold(0.0, f64::max);
+    if setup.offsets_known || read.highest() + longest <= MACHINE_ZERO_ABOVE {
+        return Ok(read);
+    }
+    let above = Setup::from_above(MACHINE_ZERO_ABOVE + read.highest() + longest);
+    read_gcode(name, bytes, control, &Setup { work: above.work, ..setup })
 }
 
 /// Where the program's zero is on the machine. A control that knows no lengths counts from where the tool's
@@ -345,6 +342,7 @@ fn chosen(meant: ToolsMeant, read: &Program, runs: &[ToolRun]) -> Result<u32, (S
 }
 
 /// What the other tools of a program do.
+#[derive(Default)]
 struct Others {
     before: Vec<(Cutter, Toolpath)>,
     unknown_before: bool,
