@@ -143,10 +143,8 @@ impl ExcessSearch<'_> {
         let unreached = if is_uncut { highest } else { unreached };
         let kind = if is_uncut {
             ExcessKind::Uncut
-        } else if reached.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
-            ExcessKind::Border
         } else {
-            ExcessKind::Scallop
+            ExcessKind::of_reached(reached.max_mm, ridge.max_mm)
         };
         // Nothing high is known, and what is open will be looked at on finer cells.
         let is_low = reached.at_most() <= limits.scallop
