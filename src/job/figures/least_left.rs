@@ -17,7 +17,7 @@ use crate::judge::highest_reached;
 use crate::run::{Finding, Run};
 use crate::{JobError, Session};
 
-/// The least that an upright cutter leaves at the highest place without cutting into the part.
+/// The least that upright cutters leave at the highest place without cutting into the part.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct LeastLeftFigures {
     /// Along the normal.
@@ -45,49 +45,60 @@ const CLOSE: f64 = 0.1;
 const LEAST_LEVEL: f64 = 0.2;
 
 impl LeastLeftFigures {
-    /// `None` where the highest material holds its limit, or may hold it after another path of this cutter.
+    /// `None` where the highest material holds its limit, or may hold it after another path of these cutters.
     pub fn above_limit(
         session: &Session,
-        cutter: &Cutter,
+        cutters: &[Cutter],
         path: &Toolpath,
-        measurement: &Measurement,
+        measurements: &[&Measurement],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
         let Limits { scallop, uncut, .. } = scene.tolerance;
-        let ridge = (highest_reached(measurement), scene.scallop_rule.highest * scallop);
-        let violated: Vec<(Point3, f64)> = [ridge, (measurement.excess.unreached, uncut)]
-            .into_iter()
+        let limited = |measured: &&Measurement| {
+            let ridge = (highest_reached(measured), scene.scallop_rule.highest * scallop);
+            [ridge, (measured.excess.unreached, uncut)]
+        };
+        let violated: Vec<(Point3, f64)> = measurements
+            .iter()
+            .flat_map(limited)
             .filter(|(material, limit)| material.stands_mm() > *limit)
             .filter_map(|(material, limit)| Some((material.at_mm?.into(), limit)))
             .collect();
         if violated.is_empty() || !path.is_upright() {
             return Ok(None);
         }
-        Self::at_or_elsewhere(session, cutter, &violated, monitor)
+        Self::at_or_elsewhere(session, cutters, &violated, monitor)
     }
 
-    /// Of the first of some places that the cutter leaves more at than the place's limit, both mm, or else of
-    /// one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in a
-    /// hollow. `None` where a path may hold the limits, as far as these places tell.
+    /// Of the first of some places that each cutter leaves more at than the place's limit, both mm, or else
+    /// of one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in
+    /// a hollow. `None` where a path may hold the limits, as far as these places tell.
     pub fn at_or_elsewhere(
         session: &Session,
-        cutter: &Cutter,
+        cutters: &[Cutter],
         places: &[(Point3, f64)],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
-        let drop = DropCutter::watched(&session.part, cutter, monitor)?;
+        let drop = |cutter: &Cutter| Ok((*cutter, DropCutter::watched(&session.part, cutter, monitor)?));
+        let drops = cutters.iter().map(drop).collect::<Result<Vec<_>, Cancelled>>()?;
         let least = |design: SurfacePoint, limit: f64| -> Result<Option<Self>, JobError> {
             if design.normal.z < LEAST_LEVEL {
                 return Ok(None);
             }
             let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
             let stock = stock / design.normal.z;
-            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
-            Ok(left.filter(|left| left.height <= stock).map(|left| Self {
-                height_mm: left.height,
-                error_bound_mm: left.bound,
+            // What one cutter takes away does not stand: the least of all, and no less than the lowest bound.
+            let (mut height, mut proven) = (f64::INFINITY, f64::INFINITY);
+            for (cutter, drop) in &drops {
+                let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
+                let Some(left) = left.filter(|left| left.height <= stock) else { return Ok(None) };
+                (height, proven) = (height.min(left.height), proven.min(left.height - left.bound));
+            }
+            Ok(height.is_finite().then(|| Self {
+                height_mm: height,
+                error_bound_mm: height - proven,
                 at_mm: design.point.into(),
                 limit_mm: limit,
             }))
@@ -98,7 +109,7 @@ impl LeastLeftFigures {
             }
         }
         let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
-        for place in most_left(session, cutter, &drop, LEAST_START * any_limit, monitor)? {
+        for place in most_left(session, &drops, LEAST_START * any_limit, monitor)? {
             if place.left > any_limit
                 && let Some(found) = least(place.design, any_limit)?
             {
@@ -109,8 +120,8 @@ impl LeastLeftFigures {
     }
 }
 
-/// A place of the part, and what the best position of the cutter that was found leaves there along its
-/// normal, mm.
+/// A place of the part, and what the best position of a cutter that was found leaves there along its normal,
+/// mm.
 #[derive(Clone, Copy)]
 struct Place {
     left: f64,
@@ -118,12 +129,11 @@ struct Place {
     design: SurfacePoint,
 }
 
-/// Places where the cutter leaves most of all nearby, most first: those of a raster that leave more than
+/// Places where the cutters leave most of all nearby, most first: those of a raster that leave more than
 /// `least`, mm, and from there uphill.
 fn most_left(
     session: &Session,
-    cutter: &Cutter,
-    drop: &DropCutter<'_>,
+    drops: &[(Cutter, DropCutter<'_>)],
     least: f64,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Place>, Cancelled> {
@@ -131,7 +141,10 @@ fn most_left(
     let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
     let place = |at: [f64; 2]| {
         let design = session.part.highest_at(at[0], at[1]).filter(|design| design.normal.z >= LEAST_LEVEL)?;
-        let left = drop.left_by_search(cutter, &design.point, &design.normal, least) * design.normal.z;
+        let by = |(cutter, drop): &(Cutter, DropCutter<'_>)| {
+            drop.left_by_search(cutter, &design.point, &design.normal, least)
+        };
+        let left = drops.iter().map(by).fold(f64::INFINITY, f64::min) * design.normal.z;
         Some(Place { left, at, design })
     };
     let raster = work::parallel::try_map(PLACES * PLACES, |k| {
@@ -173,12 +186,18 @@ fn most_left(
 }
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let cutters = run.cutters();
-    if cutters.are_several() || run.session.leaves_the_rest(run.request) {
+    if run.session.leaves_the_rest(run.request) {
         return Ok(Finding::default());
     }
-    let (path, measurement) = (run.path(), run.measurement());
-    let left = LeastLeftFigures::above_limit(run.session, cutters.first(), path, measurement, monitor)?;
+    let mut cutters: Vec<Cutter> = Vec::new();
+    for (_, cutter) in run.cutters().each() {
+        if !cutters.contains(cutter) {
+            cutters.push(*cutter);
+        }
+    }
+    let unseen = run.covered.unseen.iter().map(|unseen| &unseen.measurement);
+    let measured: Vec<&Measurement> = std::iter::once(run.measurement()).chain(unseen).collect();
+    let left = LeastLeftFigures::above_limit(run.session, &cutters, &run.whole.path, &measured, monitor)?;
     let Some(left) = left else { return Ok(Finding::default()) };
     let (height, bound) = (left.height_mm, left.error_bound_mm);
     let height = if bound <= CLOSE * height {
@@ -186,9 +205,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     } else {
         format!("at least {} µm", micrometres(Some(height - bound)))
     };
+    let [of, leaves] = match cutters.len() {
+        1 => ["this cutter", "it leaves {height} wherever it stands"],
+        _ => ["these cutters", "they leave {height} wherever they stand"],
+    };
+    let leaves = leaves.replace("{height}", &height);
     let note = format!(
-        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} wherever it stands. The part is too \
-         hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
+        "no path of {of}, upright, holds {} µm: at {} {leaves}. The part is too hollow there; take a smaller \
+         cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
     );
@@ -227,6 +251,34 @@ mod tests {
         let rounds = value(&bull, "correction").unwrap()["rounds"].as_array().unwrap().len();
         assert!(rounds <= 6, "{rounds} rounds");
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
+    }
+
+    /// Behind another toolpath with a cutter of its own the least of both is what no path takes away; a
+    /// smaller cutter before it may have come lower.
+    #[test]
+    fn what_all_cutters_of_a_chain_leave_is_told() {
+        let left = |radius: f64| {
+            let text = format!(
+                "[part]\nsurface = \"cylinder\"\nradius = 30\nconcave = true\nx = [-4, 4]\ny = [-4, 4]\n[cutter]\n\
+                 shape = \"bull\"\ncorner_radius = 1.5\ndiameter = 6\n[tolerance]\nscallop = 0.03\nuncut = 0.03\n\
+                 [[toolpath]]\nname = \"rough\"\nstrategy = \"zigzag\"\nstepover = 1\n\
+                 cutter = {{ shape = \"bull\", diameter = 7, corner_radius = {radius} }}\n\
+                 [[toolpath]]\nstrategy = \"iso-parametric\"\nstock = \"previous\"\n"
+            );
+            let session = Session::new(Scene::parse("hollow.toml", text).unwrap()).unwrap();
+            let result = session.toolpath(&session.scene.toolpaths[1], &Silent).unwrap().result;
+            let figure = result.figures.iter().find(|figure| figure.key == "least_left");
+            (figure.map(|figure| figure.value.clone()), result.notes)
+        };
+        // The larger one's flat of 2 mm leaves more than that of 1.5 mm; a flat of 0.2 mm leaves less than the
+        // limit.
+        let (found, notes) = left(1.5);
+        let found = found.unwrap_or_else(|| panic!("{notes:?}"));
+        let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| found[key].as_f64().unwrap());
+        let stands = 28.5 - (28.5f64.powi(2) - 1.5f64.powi(2)).sqrt();
+        assert!(height > 0.03 && height - bound <= stands, "{height} {bound} {stands}");
+        assert!(notes.iter().any(|note| note.contains("no path of these cutters")), "{notes:?}");
+        assert!(left(3.3).0.is_none());
     }
 
     /// Two planes that meet in a hollow crease under a ball that touches both: along the normal of one, what
@@ -274,7 +326,8 @@ mod tests {
         let session = Session::new(Scene::parse("hollows.toml", text).unwrap()).unwrap();
         let left = |at: [f64; 3]| {
             let cutter = &session.scene.tooling.cutter;
-            let left = LeastLeftFigures::at_or_elsewhere(&session, cutter, &[(at.into(), 0.027)], &Silent);
+            let left =
+                LeastLeftFigures::at_or_elsewhere(&session, &[*cutter], &[(at.into(), 0.027)], &Silent);
             left.unwrap().unwrap_or_else(|| panic!("nothing is left at {at:?}"))
         };
         // Beside the trough at x 1.5, y 3 the ball touches along x and y.
