@@ -131,6 +131,9 @@ pub struct GougeRegion {
     /// The earlier toolpath whose move it is, where it is none of this one's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub toolpath: Option<String>,
+    /// The program of that toolpath, which has the line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
 }
 
 /// Cuts below the design surface.
