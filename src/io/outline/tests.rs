@@ -181,9 +181,8 @@ fn points_that_only_rounding_parts_are_one() {
 /// the outline would cross itself, and the bound holds what they are apart.
 #[test]
 fn closed_outlines_that_miss_their_beginning_are_closed_at_it() {
-    let outline = |last: &str| {
-        format!("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 {last}")
-    };
+    let outline =
+        |last: &str| format!("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 {last}");
     for (last, off) in [("0.00003 20 -0.00004", 5e-5), ("0.003 20 -0.004", 5e-3)] {
         let found = from_dxf(&outline(last)).unwrap();
         assert_eq!((found.region.area(), found.region.curves().next().unwrap().len()), (1200.0, 4), "{last}");

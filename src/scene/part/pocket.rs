@@ -290,7 +290,8 @@ fn check(
                 RegionError::SelfCrossing { curve, at } => cure_of_crossing(&curves[curve], &at),
                 _ => None,
             };
-            let in_order = || "write the corners in order, each once: `[[0, 0], [60, 0], [60, 40]]`".to_owned();
+            let in_order =
+                || "write the corners in order, each once: `[[0, 0], [60, 0], [60, 40]]`".to_owned();
             let (k, message) = match e {
                 RegionError::Crossing { curves: [a, b], at } => {
                     (b, format!("{} and {} meet at x {:.4} y {:.4}", name(a), name(b), at.x, at.y))
@@ -568,8 +569,14 @@ mod tests {
             assert_eq!(part(points).unwrap(), plain, "{points}");
         }
         for (points, named) in [
-            ("[0, 0], [30, 0], [30, 20], [0, 20], [0.004, -0.003]", "[0.004, -0.003] and [0, 0] lie 0.0050 mm apart"),
-            ("[0, 0], [30, 0], [29.995, 0], [30, 20], [0, 20]", "[30, 0] and [29.995, 0] lie 0.0050 mm apart"),
+            (
+                "[0, 0], [30, 0], [30, 20], [0, 20], [0.004, -0.003]",
+                "[0.004, -0.003] and [0, 0] lie 0.0050 mm apart",
+            ),
+            (
+                "[0, 0], [30, 0], [29.995, 0], [30, 20], [0, 20]",
+                "[30, 0] and [29.995, 0] lie 0.0050 mm apart",
+            ),
         ] {
             let refused = part(points).unwrap_err();
             let cure = miette::Diagnostic::help(&refused).unwrap().to_string();
