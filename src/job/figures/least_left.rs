@@ -6,7 +6,7 @@ use serde::Serialize;
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use geometry::Point3;
-use metrology::{Limits, Measurement};
+use metrology::{Bounded, Limits, Measurement};
 use motion::Toolpath;
 use part::SurfacePoint;
 use report::{Figure, micrometres, place, with_bound};
@@ -46,9 +46,10 @@ const LEAST_LEVEL: f64 = 0.2;
 
 impl LeastLeftFigures {
     /// `None` where the highest material holds its limit, or may hold it after another path of these cutters.
+    /// Where others cut `before` them, only what stands is told: elsewhere those may have left less.
     pub fn above_limit(
         session: &Session,
-        cutters: &[Cutter],
+        (cutters, before): (&[Cutter], bool),
         path: &Toolpath,
         measurements: &[&Measurement],
         monitor: &dyn Monitor,
@@ -59,16 +60,32 @@ impl LeastLeftFigures {
             let ridge = (highest_reached(measured), scene.scallop_rule.highest * scallop);
             [ridge, (measured.excess.unreached, uncut)]
         };
-        let violated: Vec<(Point3, f64)> = measurements
+        let violated: Vec<(Bounded, f64)> = measurements
             .iter()
             .flat_map(limited)
-            .filter(|(material, limit)| material.stands_mm() > *limit)
-            .filter_map(|(material, limit)| Some((material.at_mm?.into(), limit)))
+            .filter(|(material, limit)| material.stands_mm() > *limit && material.at_mm.is_some())
             .collect();
         if violated.is_empty() || !path.is_upright() {
             return Ok(None);
         }
-        Self::at_or_elsewhere(session, cutters, &violated, monitor)
+        let places = violated.iter().filter_map(|(material, limit)| Some((material.at_mm?.into(), *limit)));
+        let places: Vec<(Point3, f64)> = places.collect();
+        if !before {
+            return Self::at_or_elsewhere(session, cutters, &places, monitor);
+        }
+        let drops = drops(session, cutters, monitor)?;
+        for ((place, limit), (material, _)) in places.iter().zip(&violated) {
+            if let Some(found) =
+                Self::at(session, &drops, session.part.closest_point(place).0, *limit, monitor)?
+            {
+                // Those before left no less there than what stands.
+                let stands = material.stands_mm();
+                let proven = (found.height_mm - found.error_bound_mm).min(stands);
+                let height_mm = found.height_mm.min(stands);
+                return Ok(Some(Self { height_mm, error_bound_mm: height_mm - proven, ..found }));
+            }
+        }
+        Ok(None)
     }
 
     /// Of the first of some places that each cutter leaves more at than the place's limit, both mm, or else
@@ -81,28 +98,8 @@ impl LeastLeftFigures {
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
-        let drop = |cutter: &Cutter| Ok((*cutter, DropCutter::watched(&session.part, cutter, monitor)?));
-        let drops = cutters.iter().map(drop).collect::<Result<Vec<_>, Cancelled>>()?;
-        let least = |design: SurfacePoint, limit: f64| -> Result<Option<Self>, JobError> {
-            if design.normal.z < LEAST_LEVEL {
-                return Ok(None);
-            }
-            let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
-            let stock = stock / design.normal.z;
-            // What one cutter takes away does not stand: the least of all, and no less than the lowest bound.
-            let (mut height, mut proven) = (f64::INFINITY, f64::INFINITY);
-            for (cutter, drop) in &drops {
-                let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
-                let Some(left) = left.filter(|left| left.height <= stock) else { return Ok(None) };
-                (height, proven) = (height.min(left.height), proven.min(left.height - left.bound));
-            }
-            Ok(height.is_finite().then(|| Self {
-                height_mm: height,
-                error_bound_mm: height - proven,
-                at_mm: design.point.into(),
-                limit_mm: limit,
-            }))
-        };
+        let drops = drops(session, cutters, monitor)?;
+        let least = |design, limit| Self::at(session, &drops, design, limit, monitor);
         for (place, limit) in places {
             if let Some(found) = least(session.part.closest_point(place).0, *limit)? {
                 return Ok(Some(found));
@@ -118,6 +115,44 @@ impl LeastLeftFigures {
         }
         Ok(None)
     }
+
+    /// At a place of the part, where each cutter leaves more than a limit, mm.
+    fn at(
+        session: &Session,
+        drops: &[(Cutter, DropCutter<'_>)],
+        design: SurfacePoint,
+        limit: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, JobError> {
+        if design.normal.z < LEAST_LEVEL {
+            return Ok(None);
+        }
+        let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
+        let stock = stock / design.normal.z;
+        // What one cutter takes away does not stand: the least of all, and no less than the lowest bound.
+        let (mut height, mut proven) = (f64::INFINITY, f64::INFINITY);
+        for (cutter, drop) in drops {
+            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
+            let Some(left) = left.filter(|left| left.height <= stock) else { return Ok(None) };
+            (height, proven) = (height.min(left.height), proven.min(left.height - left.bound));
+        }
+        Ok(height.is_finite().then(|| Self {
+            height_mm: height,
+            error_bound_mm: height - proven,
+            at_mm: design.point.into(),
+            limit_mm: limit,
+        }))
+    }
+}
+
+/// What tells how low each cutter comes over the part.
+fn drops<'a>(
+    session: &'a Session,
+    cutters: &[Cutter],
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Cutter, DropCutter<'a>)>, Cancelled> {
+    let drop = |cutter: &Cutter| Ok((*cutter, DropCutter::watched(&session.part, cutter, monitor)?));
+    cutters.iter().map(drop).collect()
 }
 
 /// A place of the part, and what the best position of a cutter that was found leaves there along its normal,
@@ -190,14 +225,16 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     }
     let mut cutters: Vec<Cutter> = Vec::new();
-    for (_, cutter) in run.cutters().each() {
+    for (_, cutter) in run.own_cutters.each() {
         if !cutters.contains(cutter) {
             cutters.push(*cutter);
         }
     }
     let unseen = run.covered.unseen.iter().map(|unseen| &unseen.measurement);
     let measured: Vec<&Measurement> = std::iter::once(run.measurement()).chain(unseen).collect();
-    let left = LeastLeftFigures::above_limit(run.session, &cutters, &run.whole.path, &measured, monitor)?;
+    let before = !run.before().is_empty();
+    let with = (&cutters[..], before);
+    let left = LeastLeftFigures::above_limit(run.session, with, &run.whole.path, &measured, monitor)?;
     let Some(left) = left else { return Ok(Finding::default()) };
     let (height, bound) = (left.height_mm, left.error_bound_mm);
     let height = if bound <= CLOSE * height {
@@ -210,8 +247,9 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         _ => ["these cutters", "they leave {height} wherever they stand"],
     };
     let leaves = leaves.replace("{height}", &height);
+    let behind = if before { " and behind what cut before it" } else { "" };
     let note = format!(
-        "no path of {of}, upright, holds {} µm: at {} {leaves}. The part is too hollow there; take a smaller \
+        "no path of {of}, upright{behind}, holds {} µm: at {} {leaves}. The part is too hollow there; take a smaller \
          cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
@@ -253,10 +291,10 @@ mod tests {
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
     }
 
-    /// Behind another toolpath with a cutter of its own the least of both is what no path takes away; a
-    /// smaller cutter before it may have come lower.
+    /// Behind another toolpath with a cutter of its own what stands for certain, and what its own cutter leaves
+    /// wherever it stands, tell what no path of it takes away; where the one before came lower nothing stands.
     #[test]
-    fn what_all_cutters_of_a_chain_leave_is_told() {
+    fn what_a_cutter_leaves_behind_others_is_told() {
         let left = |radius: f64| {
             let text = format!(
                 "[part]\nsurface = \"cylinder\"\nradius = 30\nconcave = true\nx = [-4, 4]\ny = [-4, 4]\n[cutter]\n\
@@ -270,14 +308,13 @@ mod tests {
             let figure = result.figures.iter().find(|figure| figure.key == "least_left");
             (figure.map(|figure| figure.value.clone()), result.notes)
         };
-        // The larger one's flat of 2 mm leaves more than that of 1.5 mm; a flat of 0.2 mm leaves less than the
-        // limit.
+        // The flat of 4 mm before leaves more than that of 3 mm; one of 0.4 mm leaves less than the limit.
         let (found, notes) = left(1.5);
         let found = found.unwrap_or_else(|| panic!("{notes:?}"));
         let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| found[key].as_f64().unwrap());
         let stands = 28.5 - (28.5f64.powi(2) - 1.5f64.powi(2)).sqrt();
         assert!(height > 0.03 && height - bound <= stands, "{height} {bound} {stands}");
-        assert!(notes.iter().any(|note| note.contains("no path of these cutters")), "{notes:?}");
+        assert!(notes.iter().any(|note| note.contains("behind what cut before it, holds")), "{notes:?}");
         assert!(left(3.3).0.is_none());
     }
 
