@@ -242,15 +242,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     } else {
         format!("at least {} µm", micrometres(Some(height - bound)))
     };
-    let [of, leaves] = match cutters.len() {
-        1 => ["this cutter", "it leaves {height} wherever it stands"],
-        _ => ["these cutters", "they leave {height} wherever they stand"],
+    let [of, leaves, stands] = match cutters.len() {
+        1 => ["this cutter", "it leaves", "it stands"],
+        _ => ["these cutters", "they leave", "they stand"],
     };
-    let leaves = leaves.replace("{height}", &height);
     let behind = if before { " and behind what cut before it" } else { "" };
     let note = format!(
-        "no path of {of}, upright{behind}, holds {} µm: at {} {leaves}. The part is too hollow there; take a smaller \
-         cutter, one with a smaller flat, or tilt it (`axis`)",
+        "no path of {of}, upright{behind}, holds {} µm: at {} {leaves} {height} wherever {stands}. The \
+         part is too hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
     );
