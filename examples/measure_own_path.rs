@@ -1,4 +1,4 @@
-//! A path of one's own, cut and measured without a scene and without a planner.
+//! A path of one's own, cut, measured and judged without a scene and without a planner.
 //!
 //! Two straight passes of a ball, 1 mm apart, on a level plate: the ridge between them is `r - √(r² - s²/4)`
 //! high.
@@ -9,11 +9,12 @@ use std::error::Error;
 
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3};
-use millstream::metrology::{Asked, Limits, measure};
+use millstream::metrology::{Asked, Limits, ScallopRule, measure};
 use millstream::monitor::Silent;
 use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut};
+use millstream::{Verdict, judge_surface};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 20.0], [0.0, 1.0]])?;
@@ -50,5 +51,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let exact = 3.0 - (9.0f64 - 0.25).sqrt();
     println!("measured {:.6} mm", found.scallop.max_mm.ok_or("no ridge was found")?);
     println!("exact    {exact:.6} mm");
+
+    let claims = judge_surface(&found, &limits, &ScallopRule::default());
+    for claim in &claims {
+        println!("{}: {}", claim.verdict().word(), claim.sentence());
+    }
+    println!("verdict  {}", Verdict::by(&claims).word());
     Ok(())
 }

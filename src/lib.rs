@@ -29,16 +29,18 @@
 //! | [`program`] | G-code or APT text | motion with lines, tools, feeds; paths |
 //! | [`io`], [`scene`], [`job`], [`report`] | files | a report and its pictures |
 //!
-//! `examples/` has one program for each of: two strategies compared, a path of your own measured, a cutter
-//! dropped on a mesh, a table of scallops.
+//! A [`Measurement`](metrology::Measurement) of a path of your own is judged by [`judge_surface`].
+//!
+//! `examples/` has one program for each of: two strategies compared, a path of your own measured and judged, a
+//! cutter dropped on a mesh, a table of scallops.
 //!
 //! Units: mm, rad in code (degrees in files), mm/min for feed, s for time. Right-handed, z up; the tool axis
 //! points from the tip to the holder. Errors are one enum a stage; a violated tolerance is a finding in the
 //! report and no error. Long work takes a [`monitor::Monitor`], which hears its progress and may cancel it.
 //! Results do not depend on the number of threads.
 
-pub use job::{JobError, Outcome, Session};
-pub use report::{RunReport, ToolpathReport, ToolpathResult, Verdict};
+pub use job::{JobError, Outcome, Session, judge_surface};
+pub use report::{Claim, RunReport, ToolpathReport, ToolpathResult, Verdict};
 pub use scene::Scene;
 pub use work::{monitor, parallel};
 pub use {

@@ -319,7 +319,7 @@ impl Corrected<'_> {
             return Ok(false);
         };
         let cutter = &self.request.tooling.cutter;
-        let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, &[(*at, limit)], monitor)?;
+        let left = LeastLeftFigures::at_or_elsewhere(self.session, &[*cutter], &[(*at, limit)], monitor)?;
         Ok(self.leaves_nearly(left))
     }
 
@@ -330,7 +330,7 @@ impl Corrected<'_> {
         }
         let (session, path) = (self.session, &self.best.plan.path);
         let cutter = &self.request.tooling.cutter;
-        let left = LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?;
+        let left = LeastLeftFigures::above_limit(session, (&[*cutter], false), path, &[measured], monitor)?;
         Ok(self.leaves_nearly(left))
     }
 

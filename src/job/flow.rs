@@ -42,6 +42,9 @@ impl Session {
         monitor: &dyn Monitor,
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
+        // The engine and the solid are those of the whole scene; an axis is the toolpath's own, which is a row.
+        let mut upright = self.scene.toolpaths.iter().filter(|request| !request.tilts());
+        upright.try_for_each(|request| self.refuse_behind_others(request))?;
         let (mut rows, mut refused, mut left) = (Vec::new(), Vec::new(), Vec::new());
         let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
         for request in &self.scene.toolpaths {
@@ -103,6 +106,7 @@ impl Session {
     /// # Errors
     /// [`JobError`]
     pub fn toolpath(&self, request: &ToolpathRequest, monitor: &dyn Monitor) -> Result<Outcome, JobError> {
+        self.refuse_behind_others(request)?;
         let all = &self.scene.toolpaths;
         let own = all.iter().position(|other| other.name == request.name).unwrap_or_default();
         let first = (0..=own).rev().find(|&k| !all[k].stock_is_previous).unwrap_or_default();
@@ -192,7 +196,7 @@ impl Session {
             strategy: request.strategy_name().to_owned(),
             folder: request.folder.clone(),
             stock_is_previous: request.stock_is_previous,
-            verdict: judge::verdict_by(&claims),
+            verdict: Verdict::by(&claims),
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
             path: planned.path_figures(&self.scene, monitor)?,
@@ -240,24 +244,36 @@ impl Session {
     }
 
     /// The figures of ridges, also where no cell sees; none is held against the target where another toolpath
-    /// cuts them off.
+    /// cuts them off. The highest is left out where its bound says nothing, and nothing hangs on it.
     fn scallop_figures(
         &self,
         request: &ToolpathRequest,
         measurement: &Measurement,
         unseen: Option<&Measurement>,
     ) -> ScallopFigures {
-        let all = |unseen| measurement.scallops_with(unseen, &self.scene.tolerance);
-        let scallop = unseen.map_or_else(|| measurement.scallop.clone(), all);
-        match self.goes_on(request) {
-            true => ScallopFigures {
-                target_mm: self.scene.tolerance.scallop,
-                over_target_fraction: None,
-                reason: scallop.reason.or(Some("the next toolpath cuts these ridges off".into())),
-                ..scallop
-            },
-            false => scallop,
+        let (limits, rule) = (&self.scene.tolerance, &self.scene.scallop_rule);
+        let all = |unseen| measurement.scallops_with(unseen, limits);
+        let mut scallop = unseen.map_or_else(|| measurement.scallop.clone(), all);
+        let goes_on = self.goes_on(request);
+        let wider = scallop.max_mm.zip(scallop.error_bound_mm).is_some_and(|(height, bound)| bound > height);
+        let reason = match wider {
+            true if goes_on => {
+                "the bound of the highest ridge is wider than that, and the next toolpath cuts it off"
+            }
+            true if judge::hides_scallops(measurement, limits, rule) => {
+                "uncut material stands as high as ridges may"
+            }
+            _ => "",
+        };
+        if !reason.is_empty() {
+            (scallop.max_mm, scallop.error_bound_mm, scallop.max_at_mm) = (None, None, None);
+            scallop.reason = Some(reason.into());
         }
+        if goes_on {
+            (scallop.target_mm, scallop.over_target_fraction) = (limits.scallop, None);
+            scallop.reason.get_or_insert_with(|| "the next toolpath cuts these ridges off".into());
+        }
+        scallop
     }
 
     fn simulation_figures(
@@ -302,7 +318,7 @@ fn answers_itself(toolpath: Option<&mut ToolpathReport>, left: &mut Vec<Claim>) 
     if let Some(ToolpathReport::Measured(result)) = toolpath {
         result.claims.append(left);
         result.claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
-        result.verdict = judge::verdict_by(&result.claims);
+        result.verdict = Verdict::by(&result.claims);
     }
 }
 

@@ -33,6 +33,7 @@ pub(crate) fn name(
         region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
         region.tool = path.named_tool_of(move_index as usize);
         region.toolpath = its.map(|before| before.name.clone());
+        region.program = its.map(|before| before.path.program_name().to_owned());
     }
 }
 

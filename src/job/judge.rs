@@ -17,6 +17,13 @@ use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 use sim::NOT_CUT;
 
+/// The limits of a measured surface, each with its figure, its bound and a sentence: gouges, uncut material,
+/// scallops; mm, the gravest first. [`Verdict::by`] all of them is the verdict on the surface. What else a
+/// scene limits, as clearances, feeds or removal, is judged where a [`Session`](crate::Session) runs it.
+pub fn judge_surface(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Vec<Claim> {
+    judge(measured, limits, rule, Vec::new(), "the program")
+}
+
 /// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are
 /// of `program`.
 pub(crate) fn judge(
@@ -28,6 +35,7 @@ pub(crate) fn judge(
 ) -> Vec<Claim> {
     let mut claims = found;
     let (uncut, highest) = (uncut(measured, limits), highest(measured, limits, rule));
+    let highest = if is_hidden(&highest, &uncut) { hidden(highest) } else { highest };
     // A scallop that is too high is one violation, not two.
     let both = [&uncut, &highest].iter().all(|claim| claim.verdict() == Verdict::Fail);
     let is_scallop = both && is_below_scallop(measured);
@@ -55,14 +63,9 @@ pub(crate) fn name_strays(claims: &mut [Claim], strays: f64) {
     }
 }
 
-/// The verdict by all of some limits.
-pub(crate) fn verdict_by(claims: &[Claim]) -> Verdict {
-    claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided)
-}
-
 /// The verdict on the measured surface alone.
 pub(crate) fn of_surface(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Verdict {
-    verdict_by(&judge(measured, limits, rule, Vec::new(), ""))
+    Verdict::by(&judge_surface(measured, limits, rule))
 }
 
 fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
@@ -79,7 +82,10 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
         }
         // Paths that tilt the tool have no program where the scene names no machine for it.
         text += &match &worst.toolpath {
-            Some(name) => format!(" of the toolpath {name} before this one, line {}", worst.line),
+            Some(name) => {
+                let program = worst.program.as_deref().unwrap_or_default();
+                format!(" of the toolpath {name} before this one, {program} line {}", worst.line)
+            }
             None if worst.line > 0 => format!(", {program} line {}", worst.line),
             None => String::new(),
         };
@@ -198,6 +204,26 @@ fn most(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Option<C
     };
     let share = Claim::length("scallop", Gravity::Finish, limit, 0.0, error_bound).told(text);
     Some(Claim { unit: "", measured, ..share })
+}
+
+/// Whether nothing is known of what passes left, beside uncut material that violates its limit: the bound is
+/// wider than the figure and than the limit.
+fn is_hidden(highest: &Claim, uncut: &Claim) -> bool {
+    let wider = highest.measured.is_some_and(|height| highest.error_bound > height.max(highest.limit));
+    wider && highest.verdict() == Verdict::Undecided && uncut.verdict() == Verdict::Fail
+}
+
+/// Whether uncut material [hides](is_hidden) what passes left.
+pub(crate) fn hides_scallops(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> bool {
+    is_hidden(&highest(measured, limits, rule), &uncut(measured, limits))
+}
+
+/// The claim without its figure, which says nothing.
+fn hidden(claim: Claim) -> Claim {
+    let limit = micrometres(Some(claim.limit));
+    let text = format!("the highest scallop or remnant beside a border is not known (limit {limit})");
+    let decided_by = "uncut material stands as high as it may; cut that first";
+    Claim { measured: None, decided_by, ..claim }.told(text)
 }
 
 /// A figure of a surface that was measured at all.

@@ -25,7 +25,7 @@ mod tool;
 mod units;
 
 pub use error::JobError;
-pub use judge::marks;
+pub use judge::{judge_surface, marks};
 pub use machined::Machined;
 pub use outcome::Outcome;
 pub use session::Session;

@@ -7,6 +7,10 @@ use sim::Stock;
 use super::earlier::EarlierPath;
 use super::{JobError, Session};
 
+/// How a toolpath behind others is measured where its engine, its axis or the solid asks for it.
+const OWN_BLOCK: &str = "measured on a block of its own: delete `stock`, or measure on cells (`engine = \"zmap\"`, without \
+                         `voxel` and `axis`)";
+
 impl Session {
     /// Refuses a toolpath that its engine cannot measure in the stock of the scene, with its tools or behind
     /// `earlier` ones.
@@ -25,9 +29,18 @@ impl Session {
             self.on_cells(request, engine, one)?;
         }
         if !earlier.is_empty() {
-            self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;
+            self.on_cells(request, engine, OWN_BLOCK)?;
         }
         Ok(())
+    }
+
+    /// Refuses a toolpath that cuts what another one left, where that cannot be measured: it is known before
+    /// the other one is planned.
+    pub(crate) fn refuse_behind_others(&self, request: &ToolpathRequest) -> Result<(), JobError> {
+        match request.stock_is_previous {
+            true => self.on_cells(request, self.engine(request)?, OWN_BLOCK),
+            false => Ok(()),
+        }
     }
 
     /// Refuses what is not measured on cells under upright tools; `otherwise` is how it is.

@@ -392,6 +392,22 @@ mod tests {
         assert!(matches!(refused, JobError::Grid { reason: GridError::Memory { .. }, .. }), "{refused}");
     }
 
+    /// Whoever fills a scene in by hand learns which key is wrong.
+    #[test]
+    fn a_cell_that_is_no_length_is_refused_by_its_key() {
+        let text = "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                    [[toolpath]]\nstrategy = \"zigzag\"\n";
+        for cell in [f64::NAN, f64::INFINITY, 0.0, -0.1] {
+            let mut scene = Scene::parse("plate.toml", text).unwrap();
+            assert!(scene.simulation.cell > 0.0 && scene.simulation.cell_is_auto);
+            (scene.simulation.cell, scene.simulation.cell_is_auto) = (cell, false);
+            let refused = Session::new(scene).unwrap_err();
+            assert!(matches!(refused, JobError::Grid { reason: GridError::Cell(_), .. }), "{refused}");
+            let told = format!("{refused}; {}", miette::Diagnostic::help(&refused).unwrap());
+            assert!(told.contains("another `cell`") && told.contains(&format!("is {cell} mm")), "{told}");
+        }
+    }
+
     /// Arcs of a program may be off its moves: what they cut is not proven any nearer.
     #[test]
     fn bounds_are_wider_where_programs_have_arcs() {

@@ -137,7 +137,7 @@ impl<'a> Section<'a> {
 
     /// The table under `key`; an empty one when it is not there.
     pub fn section(&self, key: &str) -> Result<Section<'a>, SceneError> {
-        let title = format!("[{key}]");
+        let title = self.title_of(key);
         let (source, span) = (self.source, self.key_span(key));
         let Some(entry) = self.entry(key) else {
             return Ok(Section { source, title, span: 0..0, table: None });
@@ -145,6 +145,15 @@ impl<'a> Section<'a> {
         match entry.get_ref() {
             DeValue::Table(table) => Ok(Section { source, title, span, table: Some(table) }),
             _ => Err(self.wrong_type(key, "a table", entry, &format!("write a header `[{key}]`"))),
+        }
+    }
+
+    /// What messages call the table under `key`: `[cutter]`, `[toolpath.cutter] of [[toolpath]] number 2`.
+    fn title_of(&self, key: &str) -> String {
+        let list = self.title.strip_prefix("[[").and_then(|rest| rest.split_once("]]"));
+        match list {
+            Some((name, _)) => format!("[{name}.{key}] of {}", self.title),
+            None => format!("[{key}]"),
         }
     }
 

@@ -141,13 +141,8 @@ impl ExcessSearch<'_> {
         let is_uncut = unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0
             || highest.max_mm > reached.at_most();
         let unreached = if is_uncut { highest } else { unreached };
-        let kind = if is_uncut {
-            ExcessKind::Uncut
-        } else if reached.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
-            ExcessKind::Border
-        } else {
-            ExcessKind::Scallop
-        };
+        let kind =
+            if is_uncut { ExcessKind::Uncut } else { ExcessKind::of_reached(reached.max_mm, ridge.max_mm) };
         // Nothing high is known, and what is open will be looked at on finer cells.
         let is_low = reached.at_most() <= limits.scallop
             || self.inspection.is_first_look && reached.max_mm <= limits.scallop;

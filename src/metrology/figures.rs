@@ -131,6 +131,9 @@ pub struct GougeRegion {
     /// The earlier toolpath whose move it is, where it is none of this one's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub toolpath: Option<String>,
+    /// The program of that toolpath, which has the line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
 }
 
 /// Cuts below the design surface.
@@ -257,13 +260,29 @@ fn is_not_cut(move_index: &u32) -> bool {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExcessKind {
-    /// A ridge between two passes that came down to the design, or its flank.
+    /// Nothing was found above the design.
     #[default]
+    None,
+    /// A ridge between two passes that came down to the design, or its flank.
     Scallop,
     /// Between a pass that came down to the design and a border of it.
     Border,
     /// Where no pass came down to the design.
     Uncut,
+}
+
+impl ExcessKind {
+    /// Of the highest material, mm, where passes came down to the design and the highest ridge between them
+    /// is `ridge` high.
+    pub(crate) fn of_reached(height: f64, ridge: f64) -> Self {
+        if height <= NUMERICAL_FLOOR {
+            Self::None
+        } else if height > ridge + NUMERICAL_FLOOR {
+            Self::Border
+        } else {
+            Self::Scallop
+        }
+    }
 }
 
 /// The highest material anywhere on what was judged. Scallops and remnants along borders are reached: they

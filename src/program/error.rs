@@ -4,16 +4,21 @@ use thiserror::Error;
 
 /// A program that cannot be read.
 #[derive(Debug, Clone, PartialEq, Error)]
-#[error("{name}:{line}:{column}: {fault}")]
+#[error("{name}{}: {fault}", place(*line, *column))]
 pub struct ProgramError {
     /// What messages call the program.
     pub name: String,
-    /// Line, from 1.
+    /// Line, from 1; 0 where no line is at fault.
     pub line: u32,
-    /// Column in bytes, from 1.
+    /// Column in bytes, from 1; 0 where no line is at fault.
     pub column: u32,
     /// What is wrong.
     pub fault: Fault,
+}
+
+/// The place behind the name of a program.
+fn place(line: u32, column: u32) -> String {
+    if line == 0 { String::new() } else { format!(":{line}:{column}") }
 }
 
 impl ProgramError {

@@ -93,8 +93,11 @@ fn moves_are_off_arcs_by_no_more_than_is_told() {
 fn a_chord_tolerance_that_is_none_is_refused() {
     let program = read("G0 X1\nG2 X3 I1 F100\nM30\n");
     for chord in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
-        let refused = program.runs(&Placing { chord, kinematics: None, lengths: &|_| None }).err();
-        assert!(matches!(refused.map(|e| e.fault), Some(crate::Fault::Chord(_))), "{chord}");
+        let refused = program.runs(&Placing { chord, kinematics: None, lengths: &|_| None }).err().unwrap();
+        assert!(matches!(refused.fault, crate::Fault::Chord(_)), "{chord}");
+        // No line of the program is at fault.
+        let told = format!("{}: the chord tolerance is {chord} mm; it must be above 0", program.name);
+        assert_eq!(refused.to_string(), told);
     }
 }
 

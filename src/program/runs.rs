@@ -69,7 +69,7 @@ impl Program {
     pub fn runs(&self, placing: &Placing<'_>) -> Result<Vec<ToolRun>, ProgramError> {
         if !(placing.chord > 0.0 && placing.chord.is_finite()) {
             let fault = Fault::Chord(placing.chord);
-            return Err(ProgramError { name: self.name.clone(), line: 1, column: 1, fault });
+            return Err(ProgramError { name: self.name.clone(), line: 0, column: 0, fault });
         }
         let mut runs: Vec<Run> = Vec::new();
         let mut dwells = self.dwells.iter().peekable();

@@ -290,6 +290,7 @@ fn data_url(png: &[u8]) -> String {
 /// The highest material and what it is.
 fn highest_material(excess: &ExcessFigures) -> String {
     let what = match excess.kind {
+        ExcessKind::None => "none found",
         ExcessKind::Scallop => "a scallop",
         ExcessKind::Border => "along a border",
         ExcessKind::Uncut => "uncut",
@@ -430,5 +431,6 @@ mod tests {
         assert_eq!(html.matches("toolpath.nc line 1240").count(), 2, "in the head and in its toolpath");
         assert!(html.contains("Rings mark") && html.contains("<th>G1</th>") && !html.contains("<th>G2</th>"));
         assert!(html.contains("1 of 2 toolpaths hold every tolerance"));
+        assert!(html.contains("0.00 ± 0.00 µm, none found"), "there is no ridge to call a scallop");
     }
 }

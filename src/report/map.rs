@@ -333,20 +333,84 @@ pub(super) fn write_title(page: &mut Picture, words: &MapWords<'_>) {
     page.text(LEFT, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
 }
 
+/// Radius of the rings around places, pixels.
+const RING: i64 = 9;
+
 /// Rings around places, with their names beside them.
 fn draw_marks(page: &mut Picture, grid: &Grid, map: &Pooled, marks: &[MapMark]) {
-    const RADIUS: i64 = 9;
     let corner = (grid.origin.x - 0.5 * grid.cell, grid.origin.y - 0.5 * grid.cell);
     let bottom = (TOP + map.height * map.magnify) as i64;
-    for mark in marks {
+    let place = |mark: &MapMark| {
         let x = LEFT as i64 + ((mark.at[0] - corner.0) / map.pixel) as i64;
-        let y = bottom - 1 - ((mark.at[1] - corner.1) / map.pixel) as i64;
-        page.ring(x, y, RADIUS, PAPER);
-        page.ring(x, y, RADIUS - 2, INK);
-        let width = (mark.name.chars().count() * TextSize::Small.letter_width()) as i64;
-        page.fill(x + RADIUS + 2, y - 8, width + 4, 16, PAPER);
-        page.text(x + RADIUS + 4, y - 8, &mark.name, TextSize::Small, Align::Left, INK);
+        [x, bottom - 1 - ((mark.at[1] - corner.1) / map.pixel) as i64]
+    };
+    let rings: Vec<[i64; 2]> = marks.iter().map(place).collect();
+    for [x, y] in &rings {
+        page.ring(*x, *y, RING, PAPER);
+        page.ring(*x, *y, RING - 2, INK);
     }
+    let width = |mark: &MapMark| (mark.name.chars().count() * TextSize::Small.letter_width()) as i64 + 4;
+    let [across, up] = [map.width, map.height].map(|cells| (cells * map.magnify) as i64);
+    let within = Label { left: LEFT as i64, top: TOP as i64, width: across, height: up };
+    for (mark, label) in marks.iter().zip(labels(&rings, marks.iter().map(width), within)) {
+        page.fill(label.left, label.top, label.width, label.height, PAPER);
+        page.text(label.left + 2, label.top, &mark.name, TextSize::Small, Align::Left, INK);
+    }
+}
+
+/// Where a name stands, pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Label {
+    left: i64,
+    top: i64,
+    width: i64,
+    height: i64,
+}
+
+impl Label {
+    fn meets(&self, other: &Self) -> bool {
+        let apart = |a: i64, size: i64, b: i64, other: i64| a + size <= b || b + other <= a;
+        !apart(self.left, self.width, other.left, other.width)
+            && !apart(self.top, self.height, other.top, other.height)
+    }
+
+    fn lies_in(&self, map: &Self) -> bool {
+        let inside = |a: i64, size: i64, from: i64, all: i64| a >= from && a + size <= from + all;
+        inside(self.left, self.width, map.left, map.width)
+            && inside(self.top, self.height, map.top, map.height)
+    }
+}
+
+/// The place of each ring's name: beside it where no other name and no other ring is, as near as can be, on
+/// the map where there is room.
+fn labels(rings: &[[i64; 2]], widths: impl Iterator<Item = i64>, map: Label) -> Vec<Label> {
+    const HEIGHT: i64 = 16;
+    /// Names are tried so many times their height farther away.
+    const FAR: i64 = 6;
+    let around =
+        |[x, y]: &[i64; 2]| Label { left: x - RING, top: y - RING, width: 2 * RING, height: 2 * RING };
+    let mut placed: Vec<Label> = Vec::with_capacity(rings.len());
+    for (k, (ring, width)) in rings.iter().zip(widths).enumerate() {
+        let [x, y] = *ring;
+        let beside = |away: i64| {
+            let (right, left) = (x + RING + 2 + away, x - RING - 2 - away - width);
+            let (up, down) = (y - HEIGHT - RING - 2 - away, y + RING + 2 + away);
+            let [level, middle] = [y - HEIGHT / 2, x - width / 2];
+            let places = [(right, level), (left, level), (middle, up), (middle, down)];
+            places.into_iter().chain([(right, up), (right, down), (left, up), (left, down)])
+        };
+        let all = (0..=FAR).flat_map(|times| beside(times * HEIGHT));
+        let all = all.map(|(left, top)| Label { left, top, width, height: HEIGHT });
+        let others =
+            || rings.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, ring)| around(ring));
+        let is_free = |label: &Label| {
+            !placed.iter().any(|other| label.meets(other)) && !others().any(|other| label.meets(&other))
+        };
+        let on_map = all.clone().filter(|label| label.lies_in(&map)).find(is_free);
+        let chosen = on_map.or_else(|| all.clone().find(is_free)).or_else(|| all.clone().next());
+        placed.extend(chosen);
+    }
+    placed
 }
 
 /// Round positions in mm along the bottom and the left side.
@@ -437,6 +501,22 @@ mod tests {
 
     fn grid(nx: usize, ny: usize) -> Grid {
         Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx, ny }
+    }
+
+    /// Rings at one place and in a row keep names that can be read, on the page and off other rings.
+    #[test]
+    fn names_of_rings_do_not_cover_each_other() {
+        let page = Label { left: 0, top: 0, width: 400, height: 300 };
+        let rings: Vec<[i64; 2]> =
+            (0..11).map(|k| if k < 6 { [10, 10 + k / 2] } else { [395, 150 + 9 * k] }).collect();
+        let found = labels(&rings, rings.iter().map(|_| 20), page);
+        for (k, label) in found.iter().enumerate() {
+            assert!(label.lies_in(&page), "{label:?}");
+            assert!(!found[..k].iter().any(|other| label.meets(other)), "{found:?}");
+        }
+        // Alone it stands to the right.
+        let [label] = labels(&[[100, 100]], [20].into_iter(), page)[..] else { panic!("one ring, one name") };
+        assert_eq!((label.left, label.top), (111, 92));
     }
 
     #[test]

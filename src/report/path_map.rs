@@ -21,9 +21,9 @@ const SHADES: usize = 8;
 /// The gradient's light end cannot be seen on paper.
 const LIGHTEST: f64 = 0.85;
 
-/// Colours of links on the surface, and of moves off it.
+/// Colours of links on the surface, and of moves off it, which are seen on the part and beside it.
 const LINK: Rgb = [222, 90, 0];
-const AIR: Rgb = [188, 192, 198];
+const AIR: Rgb = [104, 110, 122];
 
 /// Colours of the first and the last place.
 const START: Rgb = [20, 130, 60];
@@ -52,32 +52,54 @@ pub fn path_picture(
     let map = pool(&grid, &values, Pooling::Mean, size);
     let colour = |value: f32| if value.is_nan() { OFF_PART } else { PAPER };
     let shades = shades(lines);
+    let mut drawn = Drawn::default();
     let (mut page, legend) = draw(&grid, &map, &colour, words, |page| {
+        let size = [map.width * map.magnify, map.height * map.magnify];
         let mut ink = |colour: Rgb, width: f64, wanted: &dyn Fn(usize) -> bool| {
+            let mut is_seen = false;
             let mut strokes = Strokes::blank(map.width * map.magnify, map.height * map.magnify);
             for (_, line) in lines.iter().enumerate().filter(|(k, _)| wanted(*k)) {
                 let [a, b] = line.ends.map(|end| map.place(&grid, end));
                 strokes.line(a, b, width);
+                is_seen |= crosses(size, a, b);
             }
             page.ink(Pooled::CORNER, &strokes, colour);
+            is_seen
         };
-        ink(AIR, AIR_WIDTH, &|k| !lines[k].kind.is_on_surface());
+        drawn.air = ink(AIR, AIR_WIDTH, &|k| !lines[k].kind.is_on_surface());
         for shade in 0..SHADES {
             let cut = |k: usize| lines[k].kind == MoveKind::Cut && shades[k] == shade;
-            ink(shade_colour(shade), CUT_WIDTH, &cut);
+            drawn.cuts |= ink(shade_colour(shade), CUT_WIDTH, &cut);
         }
-        ink(LINK, CUT_WIDTH, &|k| lines[k].kind == MoveKind::Link);
+        drawn.links = ink(LINK, CUT_WIDTH, &|k| lines[k].kind == MoveKind::Link);
         let mut cuts = lines.iter().filter(|line| line.kind.is_on_surface());
         let first = cuts.next();
         let ends = [(first, 0, START), (cuts.next_back().or(first), 1, END)];
         for (line, end, colour) in ends {
             if let Some(line) = line {
-                disc(page, &map, map.place(&grid, line.ends[end]), colour);
+                drawn.ends[end] = disc(page, &map, map.place(&grid, line.ends[end]), colour);
             }
         }
     });
-    draw_legend(&mut page, legend);
+    draw_legend(&mut page, legend, &drawn);
     page
+}
+
+/// What the picture shows.
+#[derive(Default)]
+struct Drawn {
+    cuts: bool,
+    links: bool,
+    air: bool,
+    /// The first place and the last.
+    ends: [bool; 2],
+}
+
+/// Whether a line can be seen on a map of a size, pixels: moves up and down are points.
+fn crosses(size: [usize; 2], a: [f64; 2], b: [f64; 2]) -> bool {
+    const LEAST: f64 = 0.5;
+    let is_long = (b[0] - a[0]).hypot(b[1] - a[1]) > LEAST;
+    is_long && (0..2).all(|c| a[c].max(b[c]) >= 0.0 && a[c].min(b[c]) <= size[c] as f64)
 }
 
 /// The map with as many cells around it, off the part, as the lines on the surface reach beyond it.
@@ -120,36 +142,42 @@ fn shade_colour(shade: usize) -> Rgb {
     sequential(LIGHTEST * shade as f64 / (SHADES - 1) as f64)
 }
 
-/// A disc on the map; one outside of it is left out.
-fn disc(page: &mut Picture, map: &Pooled, [x, y]: [f64; 2], colour: Rgb) {
+/// A disc on the map; one outside of it is left out. Whether it is there.
+fn disc(page: &mut Picture, map: &Pooled, [x, y]: [f64; 2], colour: Rgb) -> bool {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
-    if (0.0..=width as f64).contains(&x) && (0.0..=height as f64).contains(&y) {
+    let is_there = (0.0..=width as f64).contains(&x) && (0.0..=height as f64).contains(&y);
+    if is_there {
         let at = [0, 1].map(|c| Pooled::CORNER[c] + [x, y][c] as i64);
         page.disc(at[0], at[1], DISC + 1, PAPER);
         page.disc(at[0], at[1], DISC, colour);
     }
+    is_there
 }
 
-/// What the colours mean.
-fn draw_legend(page: &mut Picture, [x, y]: [i64; 2]) {
+/// What the colours mean, of what is drawn.
+fn draw_legend(page: &mut Picture, [x, y]: [i64; 2], drawn: &Drawn) {
     const LINE: i64 = 26;
     const SIGN: i64 = 26;
     let signs = [
-        (shade_colour(0), "first cuts"),
-        (shade_colour(SHADES - 1), "last cuts"),
-        (LINK, "surface link"),
-        (AIR, "off the surface"),
+        (drawn.cuts, shade_colour(0), "first cuts"),
+        (drawn.cuts, shade_colour(SHADES - 1), "last cuts"),
+        (drawn.links, LINK, "surface link"),
+        (drawn.air, AIR, "off the surface"),
     ];
     let text = |page: &mut Picture, line: i64, words: &str| {
         page.text(x + SIGN + 4, y + line * LINE, words, TextSize::Small, Align::Left, INK);
     };
-    for (line, (colour, words)) in (0..).zip(signs) {
+    let mut line = 0;
+    for (_, colour, words) in signs.into_iter().filter(|sign| sign.0) {
         page.fill(x + 2, y + line * LINE + 7, SIGN - 6, 2, colour);
         text(page, line, words);
+        line += 1;
     }
-    for (line, colour, words) in [(4, START, "start"), (5, END, "end")] {
+    let ends = [(drawn.ends[0], START, "start"), (drawn.ends[1], END, "end")];
+    for (_, colour, words) in ends.into_iter().filter(|sign| sign.0) {
         page.disc(x + SIGN / 2, y + line * LINE + 8, DISC, colour);
         text(page, line, words);
+        line += 1;
     }
 }
 
@@ -189,6 +217,30 @@ mod tests {
         assert!(first != PAPER && last != PAPER && first != last && link != first && link != last);
         assert!(link[0] > link[2], "orange: {link:?}");
         assert_eq!(at(22.5, 1.0), OFF_PART, "as far around the part as the last pass goes");
+    }
+
+    /// The legend has what the picture shows; moves off the surface differ from the part and from what is
+    /// beside it.
+    #[test]
+    fn the_legend_names_what_is_drawn() {
+        let grid = Grid { origin: Point2::new(0.25, 0.25), cell: 0.5, nx: 40, ny: 20 };
+        let deviation = vec![0.0f32; grid.len()];
+        let [cut, down] =
+            [line([1.0, 1.0], [19.0, 1.0], MoveKind::Cut), line([1.0, 1.0], [1.0, 1.0], MoveKind::Plunge)];
+        let links = line([19.0, 1.0], [19.0, 3.0], MoveKind::Link);
+        let over = line([19.0, 3.0], [1.0, 9.0], MoveKind::Rapid);
+        let shows = |lines: &[PathLine], colour: Rgb| {
+            let page = path_picture(&grid, &deviation, lines, &WORDS, MapSize::File);
+            let map = pool(&grid, &deviation, Pooling::Mean, MapSize::File);
+            let right = Pooled::CORNER[0] as u32 + (map.width * map.magnify) as u32 + 4;
+            let all = page.pixels.enumerate_pixels();
+            all.filter(|(x, _, pixel)| *x > right && pixel.0 == colour).count() > 0
+        };
+        assert!(!shows(&[down, cut], LINK) && !shows(&[down, cut], AIR) && shows(&[down, cut], START));
+        assert!(shows(&[cut, links], LINK) && !shows(&[cut, links], AIR));
+        assert!(shows(&[cut, over], AIR) && !shows(&[over], START) && !shows(&[], END));
+        let apart = |a: Rgb, b: Rgb| a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).min().unwrap();
+        assert!(apart(AIR, PAPER) > 50 && apart(AIR, OFF_PART) > 50);
     }
 
     #[test]

@@ -31,6 +31,11 @@ impl Verdict {
         }
     }
 
+    /// By all of some limits: that of the worst; undecided where there are none.
+    pub fn by(claims: &[Claim]) -> Self {
+        claims.iter().map(Claim::verdict).max().unwrap_or(Self::Undecided)
+    }
+
     /// Of a run whose toolpaths have these verdicts: what was not planned fails it.
     pub fn of_run(verdicts: impl IntoIterator<Item = Self>) -> Self {
         verdicts.into_iter().max().map_or(Self::Fail, |worst| worst.min(Self::Fail))

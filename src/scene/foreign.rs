@@ -239,9 +239,13 @@ fn described(
 /// The fault shown in the text of the program, where that can be shown.
 fn in_text(error: &ProgramError, bytes: &[u8]) -> SceneError {
     let text = String::from_utf8_lossy(bytes);
-    let start = text.split_inclusive('\n').take(error.line as usize - 1).map(str::len).sum::<usize>();
-    let at = start + error.column as usize - 1;
+    let lines = (error.line as usize).saturating_sub(1);
+    let start = text.split_inclusive('\n').take(lines).map(str::len).sum::<usize>();
+    let at = start + (error.column as usize).saturating_sub(1);
     let source = SceneText::new(&error.name, text.into_owned());
+    if error.line == 0 {
+        return source.error(0..0, error.fault.to_string(), error.cure());
+    }
     let message = format!("line {}, column {}: {}", error.line, error.column, error.fault);
     source.error(at..at + 1, message, error.cure())
 }

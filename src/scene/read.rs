@@ -117,7 +117,7 @@ impl Scene {
                 "delete it, or delete [compare]",
             ));
         }
-        let mut simulation = read_simulation(&root.section("simulation")?, &tolerance)?;
+        let simulation = read_simulation(&root.section("simulation")?, &tolerance)?;
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
@@ -134,9 +134,6 @@ impl Scene {
             tooling::check_rates(&root, &tooling, &toolpaths, &machine)?;
         }
         check_pocket_strategies(&root, &part, &toolpaths)?;
-        if simulation.cell_is_auto {
-            simulation.cell = auto_cell(&toolpaths);
-        }
         Ok(Self {
             source: source.clone(),
             title,
@@ -148,7 +145,7 @@ impl Scene {
             tolerance,
             scallop_rule,
             off_direction,
-            simulation,
+            simulation: simulation(&toolpaths),
             machine,
             five_axis,
             arcs,
@@ -243,8 +240,11 @@ fn read_scallop_rule(section: &Section<'_>) -> Result<ScallopRule, SceneError> {
     })
 }
 
-/// An automatic cell is unknown until the toolpaths are read.
-fn read_simulation(section: &Section<'_>, limits: &Limits) -> Result<Simulation, SceneError> {
+/// What there is once the toolpaths are read, which an automatic cell follows from.
+fn read_simulation(
+    section: &Section<'_>,
+    limits: &Limits,
+) -> Result<impl FnOnce(&[ToolpathRequest]) -> Simulation + use<>, SceneError> {
     section.only(
         &["cell", "memory_mib", "engine", "removal", "error_bound", "voxel"],
         &[],
@@ -253,14 +253,18 @@ fn read_simulation(section: &Section<'_>, limits: &Limits) -> Result<Simulation,
     let cell = section.length_or_word("cell", "auto")?;
     let engine =
         section.word("engine", &EngineChoice::words())?.and_then(|word| EngineChoice::from_word(word.value));
-    Ok(Simulation {
-        cell: cell.unwrap_or(f64::NAN),
+    let memory_mib = section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB);
+    let removal = section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL);
+    let error_bound = section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value);
+    let voxel = section.length("voxel")?.map(|v| v.value);
+    Ok(move |toolpaths: &[ToolpathRequest]| Simulation {
+        cell: cell.unwrap_or_else(|| auto_cell(toolpaths)),
         cell_is_auto: cell.is_none(),
-        memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
+        memory_mib,
         engine: engine.unwrap_or_default(),
-        removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
-        error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
-        voxel: section.length("voxel")?.map(|v| v.value),
+        removal,
+        error_bound,
+        voxel,
     })
 }
 

@@ -749,6 +749,26 @@ fn how_corners_are_blended_is_read_where_it_acts() {
     assert!(refused(five).contains("rotary axes"), "{}", refused(five));
 }
 
+/// A toolpath's own cutter is named by its key there, and not as that of the scene.
+#[test]
+fn what_is_wrong_with_a_toolpaths_own_cutter_names_it() {
+    let own = |cutter: &str| {
+        let toolpath = format!(
+            "[[toolpath]]\nname = \"rest\"\nstrategy = \"zigzag\"\nstepover = 1\ncutter = {{ {cutter} }}\n"
+        );
+        let refused = Scene::parse("wave.toml", format!("{VALID}{toolpath}")).unwrap_err();
+        let cure = miette::Diagnostic::help(&refused).unwrap().to_string();
+        (refused.to_string(), cure)
+    };
+    let count = VALID.matches("[[toolpath]]").count() + 1;
+    let (message, _) = own("shape = \"ball\"");
+    assert_eq!(message, format!("[toolpath.cutter] of [[toolpath]] number {count} has no `diameter`"));
+    let (message, _) = own("shape = \"ball\", diametr = 4");
+    assert!(message.contains(&format!("[toolpath.cutter] of [[toolpath]] number {count}")), "{message}");
+    let (_, cure) = own("shape = \"ball\", diameter = 4, feed_rate = 20000");
+    assert!(cure.starts_with("write `feed_rate = 15000` in the `cutter` of \"rest\" or less"), "{cure}");
+}
+
 /// Where a feed stands in [cutter], it is named there; else the rate of the machine that is below the usual
 /// one.
 #[test]

@@ -84,8 +84,9 @@ pub(super) fn check_rates(
     let own = sections.iter().filter(|section| section.has(CUTTER)).map(|section| section.section(CUTTER));
     let cutters: Vec<Section<'_>> =
         [root.section(CUTTER)].into_iter().chain(own).collect::<Result<_, _>>()?;
-    let tools = toolpaths.iter().map(|request| &request.tooling).filter(|tooling| *tooling != of_scene);
-    for tooling in [of_scene].into_iter().chain(tools) {
+    let tools = toolpaths.iter().filter(|request| request.tooling != *of_scene);
+    let tools = tools.map(|request| (format!("the `{CUTTER}` of \"{}\"", request.name), &request.tooling));
+    for (place, tooling) in [(format!("[{CUTTER}]"), of_scene)].into_iter().chain(tools) {
         let CuttingData { feed_rate, plunge_rate, .. } = tooling.cutting;
         let too_fast = |(_, rate): &(&str, f64)| *rate > machine.rapid_rate;
         let Some((key, rate)) =
@@ -105,7 +106,7 @@ pub(super) fn check_rates(
         let message =
             format!("`{key}` is {rate} mm/min, more than the machine's `rapid_rate` of {rapid_rate} mm/min");
         let cure = format!(
-            "write `{key} = {rapid_rate}` in [cutter] or less, or a greater `rapid_rate` in [machine]"
+            "write `{key} = {rapid_rate}` in {place} or less, or a greater `rapid_rate` in [machine]"
         );
         return Err(section.error(&section.key_span(stated), message, cure));
     }

@@ -81,7 +81,8 @@ fn a_gouge_of_an_earlier_toolpath_is_named() {
         assert_eq!(gouge["regions"][0].get("toolpath").and_then(Value::as_str), toolpath, "{gouge}");
     }
     let text = report["toolpaths"][1]["violations"].to_string();
-    assert!(text.contains("of the toolpath rough before this one, line 6"), "{text}");
+    assert!(text.contains("of the toolpath rough before this one, rough.nc line 6"), "{text}");
+    assert_eq!(report["toolpaths"][1]["gouge"]["regions"][0]["program"], "rough.nc");
 }
 
 /// A wall of 5 × 8 mm that leans by so much, mm, and the level ground behind it.
@@ -150,7 +151,7 @@ fn a_gouge_where_no_cell_sees_is_named_as_others_are() {
         assert_eq!([&region["move"], &region["line"]], [3, 6], "{gouge}");
         assert_eq!(region.get("toolpath").and_then(Value::as_str), toolpath, "{gouge}");
         let text = report["toolpaths"][k]["violations"].to_string();
-        let of = toolpath.map_or(", deep.nc", |_| " of the toolpath deep before this one,");
+        let of = toolpath.map_or(", deep.nc", |_| " of the toolpath deep before this one, deep.nc");
         assert!(text.contains(&format!("move 3{of} line 6, measured along normals")), "{text}");
     }
 }
@@ -202,6 +203,21 @@ fn what_has_no_previous_stock_says_so() {
     let (code, report) = run(home.path(), &leaning);
     let reason = report["toolpaths"][1]["reason"].as_str().unwrap();
     assert!(code == Some(1) && reason.contains("measured on a block of its own"), "{reason}");
+}
+
+/// Whether a chain can be measured hangs on [simulation] alone: nothing is planned before it is refused.
+#[test]
+fn engines_that_measure_no_chain_refuse_it_before_any_work() {
+    let home = tempfile::tempdir().unwrap();
+    for simulation in ["engine = \"rays\"", "engine = \"voxel\"", "voxel = 0.5"] {
+        let scene = format!("{PLATE}{simulation}\n{ROUGH}{FINISH}{PREVIOUS}");
+        std::fs::write(home.path().join("scene.toml"), scene).unwrap();
+        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{simulation}");
+        let words = answer.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains("\"finish\"") && words.contains("measured on a block of its own"), "{words}");
+        assert!(words.contains("zmap"), "{words}");
+    }
 }
 
 /// A larger cutter roughs by levels and leaves the same everywhere over a part with a hollow and a dome: no

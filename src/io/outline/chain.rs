@@ -1,10 +1,7 @@
 //! Open polylines joined to closed ones where their ends meet within [`JOIN_TOLERANCE`].
 
-use super::{Chords, Drawn, JOIN_TOLERANCE, OutlineError};
-use geometry::Point2;
-
-/// Points that lie no farther apart, mm, are one but for rounding of the file.
-const ROUNDING: f64 = 1.0e-6;
+use super::{Chords, Drawn, JOIN_TOLERANCE, OutlineError, ROUNDING};
+use geometry::{Point2, Region, RegionError};
 
 fn gap(a: &Point2, b: &Point2) -> f64 {
     (a - b).norm()
@@ -34,6 +31,21 @@ impl Chords {
         }
         self.off_curve += moved;
     }
+
+    /// Closes at its first point what is drawn as closed, and whose last point, near the first one, makes it
+    /// cross itself. How far that was off, mm, which is in the bound; `None` where nothing is wrong.
+    pub fn close_at_first(&mut self) -> Option<f64> {
+        let gap_of = |points: &[Point2]| gap(&points[0], &points[points.len() - 1]);
+        let mut moved = None;
+        while self.closed && self.points.len() > 3 && gap_of(&self.points) <= JOIN_TOLERANCE {
+            let crossing = Region::nested(vec![self.points.clone()]);
+            let Err(RegionError::SelfCrossing { .. }) = crossing else { break };
+            moved = Some(gap_of(&self.points).max(moved.unwrap_or(0.0)));
+            self.points.pop();
+        }
+        self.off_curve += moved.unwrap_or(0.0);
+        moved
+    }
 }
 
 /// All as closed outlines.
@@ -43,13 +55,22 @@ impl Chords {
 pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, OutlineError> {
     let mut closed = Vec::new();
     let mut open: Vec<Drawn> = Vec::new();
+    let (mut crossing, mut farthest) = (0usize, 0.0f64);
     for mut d in drawn {
         d.chords.tidy();
+        if let Some(off) = d.chords.close_at_first() {
+            (crossing, farthest) = (crossing + 1, farthest.max(off));
+        }
         match (d.chords.closed, d.chords.points.len()) {
             (true, _) => closed.push(d),
             (false, 0 | 1) => notes.push(format!("{} has no length and is left out", d.name())),
             (false, _) => open.push(d),
         }
+    }
+    if crossing > 0 {
+        notes.push(format!(
+            "closed outlines whose last point crosses beside the first one, closed at that: {crossing}, by up to {farthest:.4} mm"
+        ));
     }
     let (mut joined, mut widest) = (0usize, 0.0f64);
     while let Some(mut chain) = (!open.is_empty()).then(|| open.remove(0)) {

@@ -248,7 +248,7 @@ fn parse(
             }
         }
         let layer = entity.layer();
-        if !layers.contains(&layer) {
+        if !layers.iter().any(|other| other.to_lowercase() == layer.to_lowercase()) {
             layers.push(layer);
         }
         // Paper space is a sheet, not the part.

@@ -23,6 +23,9 @@ use crate::regular;
 /// rule; much more would close gaps that were meant, or join neighbours.
 pub const JOIN_TOLERANCE: f64 = 0.01;
 
+/// Points that lie no farther apart, mm, are one but for rounding of the file.
+pub const ROUNDING: f64 = 1.0e-6;
+
 /// Largest drawing that is read, bytes.
 pub const MAX_BYTES: u64 = 64 << 20;
 

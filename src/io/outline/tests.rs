@@ -177,6 +177,25 @@ fn points_that_only_rounding_parts_are_one() {
     assert_eq!((short.region.curves().next().unwrap().len(), short.off_curves), (5, 0.0));
 }
 
+/// A last point that misses the first one by less than what open ends are joined over is one with it where
+/// the outline would cross itself, and the bound holds what they are apart.
+#[test]
+fn closed_outlines_that_miss_their_beginning_are_closed_at_it() {
+    let outline =
+        |last: &str| format!("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 40 20 0 10 40 20 30 10 0 20 30 10 {last}");
+    for (last, off) in [("0.00003 20 -0.00004", 5e-5), ("0.003 20 -0.004", 5e-3)] {
+        let found = from_dxf(&outline(last)).unwrap();
+        assert_eq!((found.region.area(), found.region.curves().next().unwrap().len()), (1200.0, 4), "{last}");
+        assert!((found.off_curves - off).abs() < 1e-12, "{last}: {}", found.off_curves);
+        assert!(found.notes.join("\n").contains("closed at that: 1"), "{:?}", found.notes);
+    }
+    // One that crosses nothing is drawn so, and one farther off was meant.
+    let drawn = from_dxf(&outline("0 20 0.004")).unwrap();
+    assert_eq!((drawn.region.curves().next().unwrap().len(), drawn.off_curves), (5, 0.0));
+    let refused = from_dxf(&outline("0.03 20 -0.04")).unwrap_err().to_string();
+    assert!(refused.contains("crosses itself at x 0.03"), "{refused}");
+}
+
 /// Of the subpaths of one path those bound what is filled that have it on one side only: by the rule of its
 /// fill. Here the outer one is 80 by 60, and what lies in it 40 by 40 and 20 by 20; half a millimetre a unit.
 #[test]
@@ -235,6 +254,11 @@ fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let missing = OutlineOptions { layer: Some("cuts".into()), ..options() };
     let error = parse(inches.as_bytes(), dxf::FORMAT, &missing).unwrap_err().to_string();
     assert!(error.contains("\"cut\", \"marks\""), "{error}");
+    // To a DXF names that differ in case are one layer.
+    for layer in ["CUT", "Cut"] {
+        let other = OutlineOptions { layer: Some(layer.into()), ..options() };
+        assert!((area(&other) - 4.0 * 25.4 * 25.4).abs() < 1e-9, "{layer}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use serde::Serialize;
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use geometry::Point3;
-use metrology::{Limits, Measurement};
+use metrology::{Bounded, Limits, Measurement};
 use motion::Toolpath;
 use part::SurfacePoint;
 use report::{Figure, micrometres, place, with_bound};
@@ -17,7 +17,7 @@ use crate::judge::highest_reached;
 use crate::run::{Finding, Run};
 use crate::{JobError, Session};
 
-/// The least that an upright cutter leaves at the highest place without cutting into the part.
+/// The least that upright cutters leave at the highest place without cutting into the part.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct LeastLeftFigures {
     /// Along the normal.
@@ -45,60 +45,68 @@ const CLOSE: f64 = 0.1;
 const LEAST_LEVEL: f64 = 0.2;
 
 impl LeastLeftFigures {
-    /// `None` where the highest material holds its limit, or may hold it after another path of this cutter.
+    /// `None` where the highest material holds its limit, or may hold it after another path of these cutters.
+    /// Where others cut `before` them, only what stands is told: elsewhere those may have left less.
     pub fn above_limit(
         session: &Session,
-        cutter: &Cutter,
+        (cutters, before): (&[Cutter], bool),
         path: &Toolpath,
-        measurement: &Measurement,
+        measurements: &[&Measurement],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
         let Limits { scallop, uncut, .. } = scene.tolerance;
-        let ridge = (highest_reached(measurement), scene.scallop_rule.highest * scallop);
-        let violated: Vec<(Point3, f64)> = [ridge, (measurement.excess.unreached, uncut)]
-            .into_iter()
-            .filter(|(material, limit)| material.stands_mm() > *limit)
-            .filter_map(|(material, limit)| Some((material.at_mm?.into(), limit)))
+        let limited = |measured: &&Measurement| {
+            let ridge = (highest_reached(measured), scene.scallop_rule.highest * scallop);
+            [ridge, (measured.excess.unreached, uncut)]
+        };
+        let violated: Vec<(Bounded, f64)> = measurements
+            .iter()
+            .flat_map(limited)
+            .filter(|(material, limit)| material.stands_mm() > *limit && material.at_mm.is_some())
             .collect();
         if violated.is_empty() || !path.is_upright() {
             return Ok(None);
         }
-        Self::at_or_elsewhere(session, cutter, &violated, monitor)
+        let places = violated.iter().filter_map(|(material, limit)| Some((material.at_mm?.into(), *limit)));
+        let places: Vec<(Point3, f64)> = places.collect();
+        if !before {
+            return Self::at_or_elsewhere(session, cutters, &places, monitor);
+        }
+        let drops = drops(session, cutters, monitor)?;
+        for ((place, limit), (material, _)) in places.iter().zip(&violated) {
+            if let Some(found) =
+                Self::at(session, &drops, session.part.closest_point(place).0, *limit, monitor)?
+            {
+                // Those before left no less there than what stands.
+                let stands = material.stands_mm();
+                let proven = (found.height_mm - found.error_bound_mm).min(stands);
+                let height_mm = found.height_mm.min(stands);
+                return Ok(Some(Self { height_mm, error_bound_mm: height_mm - proven, ..found }));
+            }
+        }
+        Ok(None)
     }
 
-    /// Of the first of some places that the cutter leaves more at than the place's limit, both mm, or else of
-    /// one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in a
-    /// hollow. `None` where a path may hold the limits, as far as these places tell.
+    /// Of the first of some places that each cutter leaves more at than the place's limit, both mm, or else
+    /// of one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in
+    /// a hollow. `None` where a path may hold the limits, as far as these places tell.
     pub fn at_or_elsewhere(
         session: &Session,
-        cutter: &Cutter,
+        cutters: &[Cutter],
         places: &[(Point3, f64)],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
-        let drop = DropCutter::watched(&session.part, cutter, monitor)?;
-        let least = |design: SurfacePoint, limit: f64| -> Result<Option<Self>, JobError> {
-            if design.normal.z < LEAST_LEVEL {
-                return Ok(None);
-            }
-            let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
-            let stock = stock / design.normal.z;
-            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
-            Ok(left.filter(|left| left.height <= stock).map(|left| Self {
-                height_mm: left.height,
-                error_bound_mm: left.bound,
-                at_mm: design.point.into(),
-                limit_mm: limit,
-            }))
-        };
+        let drops = drops(session, cutters, monitor)?;
+        let least = |design, limit| Self::at(session, &drops, design, limit, monitor);
         for (place, limit) in places {
             if let Some(found) = least(session.part.closest_point(place).0, *limit)? {
                 return Ok(Some(found));
             }
         }
         let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
-        for place in most_left(session, cutter, &drop, LEAST_START * any_limit, monitor)? {
+        for place in most_left(session, &drops, LEAST_START * any_limit, monitor)? {
             if place.left > any_limit
                 && let Some(found) = least(place.design, any_limit)?
             {
@@ -107,10 +115,48 @@ impl LeastLeftFigures {
         }
         Ok(None)
     }
+
+    /// At a place of the part, where each cutter leaves more than a limit, mm.
+    fn at(
+        session: &Session,
+        drops: &[(Cutter, DropCutter<'_>)],
+        design: SurfacePoint,
+        limit: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, JobError> {
+        if design.normal.z < LEAST_LEVEL {
+            return Ok(None);
+        }
+        let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
+        let stock = stock / design.normal.z;
+        // What one cutter takes away does not stand: the least of all, and no less than the lowest bound.
+        let (mut height, mut proven) = (f64::INFINITY, f64::INFINITY);
+        for (cutter, drop) in drops {
+            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
+            let Some(left) = left.filter(|left| left.height <= stock) else { return Ok(None) };
+            (height, proven) = (height.min(left.height), proven.min(left.height - left.bound));
+        }
+        Ok(height.is_finite().then(|| Self {
+            height_mm: height,
+            error_bound_mm: height - proven,
+            at_mm: design.point.into(),
+            limit_mm: limit,
+        }))
+    }
 }
 
-/// A place of the part, and what the best position of the cutter that was found leaves there along its
-/// normal, mm.
+/// What tells how low each cutter comes over the part.
+fn drops<'a>(
+    session: &'a Session,
+    cutters: &[Cutter],
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Cutter, DropCutter<'a>)>, Cancelled> {
+    let drop = |cutter: &Cutter| Ok((*cutter, DropCutter::watched(&session.part, cutter, monitor)?));
+    cutters.iter().map(drop).collect()
+}
+
+/// A place of the part, and what the best position of a cutter that was found leaves there along its normal,
+/// mm.
 #[derive(Clone, Copy)]
 struct Place {
     left: f64,
@@ -118,12 +164,11 @@ struct Place {
     design: SurfacePoint,
 }
 
-/// Places where the cutter leaves most of all nearby, most first: those of a raster that leave more than
+/// Places where the cutters leave most of all nearby, most first: those of a raster that leave more than
 /// `least`, mm, and from there uphill.
 fn most_left(
     session: &Session,
-    cutter: &Cutter,
-    drop: &DropCutter<'_>,
+    drops: &[(Cutter, DropCutter<'_>)],
     least: f64,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Place>, Cancelled> {
@@ -131,7 +176,10 @@ fn most_left(
     let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
     let place = |at: [f64; 2]| {
         let design = session.part.highest_at(at[0], at[1]).filter(|design| design.normal.z >= LEAST_LEVEL)?;
-        let left = drop.left_by_search(cutter, &design.point, &design.normal, least) * design.normal.z;
+        let by = |(cutter, drop): &(Cutter, DropCutter<'_>)| {
+            drop.left_by_search(cutter, &design.point, &design.normal, least)
+        };
+        let left = drops.iter().map(by).fold(f64::INFINITY, f64::min) * design.normal.z;
         Some(Place { left, at, design })
     };
     let raster = work::parallel::try_map(PLACES * PLACES, |k| {
@@ -173,12 +221,20 @@ fn most_left(
 }
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let cutters = run.cutters();
-    if cutters.are_several() || run.session.leaves_the_rest(run.request) {
+    if run.session.leaves_the_rest(run.request) {
         return Ok(Finding::default());
     }
-    let (path, measurement) = (run.path(), run.measurement());
-    let left = LeastLeftFigures::above_limit(run.session, cutters.first(), path, measurement, monitor)?;
+    let mut cutters: Vec<Cutter> = Vec::new();
+    for (_, cutter) in run.own_cutters.each() {
+        if !cutters.contains(cutter) {
+            cutters.push(*cutter);
+        }
+    }
+    let unseen = run.covered.unseen.iter().map(|unseen| &unseen.measurement);
+    let measured: Vec<&Measurement> = std::iter::once(run.measurement()).chain(unseen).collect();
+    let before = !run.before().is_empty();
+    let with = (&cutters[..], before);
+    let left = LeastLeftFigures::above_limit(run.session, with, &run.whole.path, &measured, monitor)?;
     let Some(left) = left else { return Ok(Finding::default()) };
     let (height, bound) = (left.height_mm, left.error_bound_mm);
     let height = if bound <= CLOSE * height {
@@ -186,9 +242,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     } else {
         format!("at least {} µm", micrometres(Some(height - bound)))
     };
+    let [of, leaves, stands] = match cutters.len() {
+        1 => ["this cutter", "it leaves", "it stands"],
+        _ => ["these cutters", "they leave", "they stand"],
+    };
+    let behind = if before { " and behind what cut before it" } else { "" };
     let note = format!(
-        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} wherever it stands. The part is too \
-         hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
+        "no path of {of}, upright{behind}, holds {} µm: at {} {leaves} {height} wherever {stands}. The \
+         part is too hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
     );
@@ -227,6 +288,33 @@ mod tests {
         let rounds = value(&bull, "correction").unwrap()["rounds"].as_array().unwrap().len();
         assert!(rounds <= 6, "{rounds} rounds");
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
+    }
+
+    /// Behind another toolpath with a cutter of its own what stands for certain, and what its own cutter leaves
+    /// wherever it stands, tell what no path of it takes away; where the one before came lower nothing stands.
+    #[test]
+    fn what_a_cutter_leaves_behind_others_is_told() {
+        let left = |radius: f64| {
+            let text = format!(
+                "[part]\nsurface = \"cylinder\"\nradius = 30\nconcave = true\nx = [-4, 4]\ny = [-4, 4]\n[cutter]\n\
+                 shape = \"bull\"\ncorner_radius = 1.5\ndiameter = 6\n[tolerance]\nscallop = 0.03\nuncut = 0.03\n\
+                 [[toolpath]]\nname = \"rough\"\nstrategy = \"zigzag\"\nstepover = 1\n\
+                 cutter = {{ shape = \"bull\", diameter = 7, corner_radius = {radius} }}\n\
+                 [[toolpath]]\nstrategy = \"iso-parametric\"\nstock = \"previous\"\n"
+            );
+            let session = Session::new(Scene::parse("hollow.toml", text).unwrap()).unwrap();
+            let result = session.toolpath(&session.scene.toolpaths[1], &Silent).unwrap().result;
+            let figure = result.figures.iter().find(|figure| figure.key == "least_left");
+            (figure.map(|figure| figure.value.clone()), result.notes)
+        };
+        // The flat of 4 mm before leaves more than that of 3 mm; one of 0.4 mm leaves less than the limit.
+        let (found, notes) = left(1.5);
+        let found = found.unwrap_or_else(|| panic!("{notes:?}"));
+        let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| found[key].as_f64().unwrap());
+        let stands = 28.5 - (28.5f64.powi(2) - 1.5f64.powi(2)).sqrt();
+        assert!(height > 0.03 && height - bound <= stands, "{height} {bound} {stands}");
+        assert!(notes.iter().any(|note| note.contains("behind what cut before it, holds")), "{notes:?}");
+        assert!(left(3.3).0.is_none());
     }
 
     /// Two planes that meet in a hollow crease under a ball that touches both: along the normal of one, what
@@ -274,7 +362,8 @@ mod tests {
         let session = Session::new(Scene::parse("hollows.toml", text).unwrap()).unwrap();
         let left = |at: [f64; 3]| {
             let cutter = &session.scene.tooling.cutter;
-            let left = LeastLeftFigures::at_or_elsewhere(&session, cutter, &[(at.into(), 0.027)], &Silent);
+            let left =
+                LeastLeftFigures::at_or_elsewhere(&session, &[*cutter], &[(at.into(), 0.027)], &Silent);
             left.unwrap().unwrap_or_else(|| panic!("nothing is left at {at:?}"))
         };
         // Beside the trough at x 1.5, y 3 the ball touches along x and y.

@@ -10,7 +10,7 @@ const STRICT: ScallopRule = ScallopRule { share: 1.0, highest: 1.0 };
 
 fn judged(measured: &Measurement, rule: &ScallopRule) -> (Verdict, Vec<Claim>) {
     let claims = judge(measured, &LIMITS, rule, Vec::new(), "toolpath.nc");
-    (verdict_by(&claims), claims)
+    (Verdict::by(&claims), claims)
 }
 
 /// Kinds of limits with their verdicts, those that hold left out.
@@ -181,6 +181,32 @@ fn what_stands_for_certain_fails_under_an_open_bound() {
     );
 }
 
+/// Beside material that was never cut a bound as wide as the stock says nothing of what passes left.
+#[test]
+fn a_bound_that_says_nothing_is_left_out_with_its_reason() {
+    let mut measured = measurement(0.0);
+    measured.scallop = ScallopFigures::default();
+    measured.uncut.regions =
+        vec![UncutRegion { height_mm: 8.2, area_mm2: 1.0, volume_mm3: 0.1, at_mm: [1.0, 2.0, 3.0] }];
+    measured.uncut.max_height_mm = 8.2;
+    for height in [0.0, 0.0098] {
+        measured.excess.reached = Bounded::new(height, 7.269);
+        let both = [("uncut", Verdict::Fail), ("scallop", Verdict::Undecided)];
+        assert_eq!(not_held(&measured, &STRICT), both);
+        let claims = judged(&measured, &STRICT).1;
+        let json =
+            serde_json::to_value(claims.iter().find(|claim| claim.what == "scallop").unwrap()).unwrap();
+        assert!(json["measured_mm"].is_null() && json["error_bound_mm"].is_null(), "{json}");
+        assert!(json["reason"].is_string() && !json["text"].as_str().unwrap().contains('±'), "{json}");
+    }
+    // What is near its limit, or where a finer cell alone decides, keeps its figure.
+    measured.excess.reached = Bounded::new(0.0098, 0.0005);
+    assert_eq!(judged(&measured, &STRICT).1.last().unwrap().measured, Some(0.0098));
+    measured.uncut = UncutFigures { error_bound_mm: 0.0005, ..UncutFigures::default() };
+    measured.excess.reached = Bounded::new(0.0, 7.269);
+    assert_eq!(judged(&measured, &STRICT).1.last().unwrap().measured, Some(0.0));
+}
+
 #[test]
 fn what_is_cut_for_certain_fails_under_an_open_bound() {
     let mut measured = measurement(0.02);
@@ -239,7 +265,7 @@ fn what_figures_found_comes_by_its_gravity_and_fails() {
     let found = |what, gravity| Claim::length(what, gravity, 0.0, 1.0, 0.0);
     let all = vec![found("wall", Gravity::Scrap), found("collision", Gravity::Crash)];
     let claims = judge(&measurement(0.0), &LIMITS, &STRICT, all, "toolpath.nc");
-    let verdict = verdict_by(&claims);
+    let verdict = Verdict::by(&claims);
     let kinds: Vec<&str> = claims.iter().map(|c| c.what).collect();
     assert_eq!((verdict, kinds), (Verdict::Fail, vec!["collision", "wall", "gouge", "uncut", "scallop"]));
     assert_eq!(judged(&measurement(0.0), &STRICT).0, Verdict::Pass);

@@ -498,10 +498,8 @@ fn excess_figures(
     let reached = ridge.or(&place);
     let kind = if unreached.max_mm > reached.max_mm {
         ExcessKind::Uncut
-    } else if place.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
-        ExcessKind::Border
     } else {
-        ExcessKind::Scallop
+        ExcessKind::of_reached(reached.max_mm, ridge.max_mm)
     };
     ExcessFigures { highest: reached.or(&unreached), kind, reached, unreached }
 }

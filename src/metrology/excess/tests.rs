@@ -424,6 +424,18 @@ fn coarse_cells_tell_no_height_that_no_ridge_has() {
     assert!(told >= 3);
 }
 
+/// Under a flat end mill whose passes overlap nothing stands on a plane: there is no ridge to name.
+#[test]
+fn what_leaves_nothing_has_no_kind() {
+    let flat = Cutter::flat(6.0).unwrap();
+    let even: Vec<f64> = (0..3).map(|k| 2.0 * f64::from(k)).collect();
+    for cell in [0.05, 0.3] {
+        let found = measured(&part(0), &flat, &on_plane(&even), cell);
+        assert_eq!((found.excess.kind, found.scallop.max_mm), (ExcessKind::None, None), "{:?}", found.excess);
+        assert!(found.excess.highest.at_most() < 1e-5, "{:?}", found.excess);
+    }
+}
+
 /// Straight passes over a plane leave ridges of a known height, and more along the border beyond the last
 /// one.
 #[test]

@@ -290,7 +290,8 @@ impl Walls {
         excess.unreached = excess.unreached.or(&unreached);
         excess.highest = excess.highest.or(&reached).or(&unreached);
         if excess.highest.max_mm > before {
-            excess.kind = if unreached.max_mm > 0.0 { ExcessKind::Uncut } else { ExcessKind::Border };
+            let of_reached = ExcessKind::of_reached(excess.highest.max_mm, 0.0);
+            excess.kind = if unreached.max_mm > 0.0 { ExcessKind::Uncut } else { of_reached };
         }
     }
 

@@ -210,10 +210,10 @@ fn read_cleared(part: &Section<'_>) -> Result<Option<EarlierCutter>, SceneError>
 fn read_points(part: &Section<'_>) -> Result<OutlineSource, SceneError> {
     let outline = part.points("outline")?;
     let mut spans = vec![outline.span];
-    let mut curves = vec![outline.value];
+    let mut curves = vec![without_repeats(outline.value)];
     for island in part.curves("islands")? {
         spans.push(island.span);
-        curves.push(island.value);
+        curves.push(without_repeats(island.value));
     }
     check(part, &curves, &spans)?;
     Ok(OutlineSource::Points { curves })
@@ -238,6 +238,35 @@ fn read_drawing(table: &PartTable<'_>) -> Result<OutlineSource, SceneError> {
     Ok(OutlineSource::File { file: table.named(file), format, unit, layer })
 }
 
+/// Without points that repeat the one before, the first after the last, but for rounding.
+fn without_repeats(mut points: Vec<Point2>) -> Vec<Point2> {
+    let is_repeated = |a: &Point2, b: &Point2| (a - b).norm() <= outline::ROUNDING;
+    points.dedup_by(|next, kept| is_repeated(next, kept));
+    while points.len() > 3 && is_repeated(&points[0], &points[points.len() - 1]) {
+        points.pop();
+    }
+    points
+}
+
+/// What mends a curve that crosses itself: often two of its points are meant as one.
+fn cure_of_crossing(curve: &[Point2], at: &Point2) -> Option<String> {
+    let next = |k: usize| (k + 1) % curve.len();
+    let apart = |k: usize| (curve[k] - curve[next(k)]).norm();
+    let near = |k: &usize| apart(*k) <= outline::JOIN_TOLERANCE;
+    let beside = |k: &usize| (curve[*k] - at).norm().min((curve[next(*k)] - at).norm());
+    let nearest = (0..curve.len()).filter(near).min_by(|a, b| beside(a).total_cmp(&beside(b)));
+    let k = nearest.filter(|k| beside(k) <= outline::JOIN_TOLERANCE)?;
+    let [a, b] = [curve[k], curve[next(k)]];
+    Some(format!(
+        "its points [{}, {}] and [{}, {}] lie {:.4} mm apart: delete one of them; an outline closes by itself",
+        a.x,
+        a.y,
+        b.x,
+        b.y,
+        apart(k)
+    ))
+}
+
 /// Refuses points that bound no region, at the list that is wrong.
 fn check(
     part: &Section<'_>,
@@ -257,6 +286,12 @@ fn check(
             Err(part.error(&spans[k], message, "islands lie inside of the outline and apart from each other"))
         }
         Err(e) => {
+            let cure = match e {
+                RegionError::SelfCrossing { curve, at } => cure_of_crossing(&curves[curve], &at),
+                _ => None,
+            };
+            let in_order =
+                || "write the corners in order, each once: `[[0, 0], [60, 0], [60, 40]]`".to_owned();
             let (k, message) = match e {
                 RegionError::Crossing { curves: [a, b], at } => {
                     (b, format!("{} and {} meet at x {:.4} y {:.4}", name(a), name(b), at.x, at.y))
@@ -269,11 +304,7 @@ fn check(
                 | RegionError::SelfCrossing { curve, .. } => (curve, format!("{}: {e}", name(curve))),
                 RegionError::Empty | RegionError::TooManyPoints(_) => (0, e.to_string()),
             };
-            Err(part.error(
-                &spans[k],
-                message,
-                "write the corners in order, each once: `[[0, 0], [60, 0], [60, 40]]`",
-            ))
+            Err(part.error(&spans[k], message, cure.unwrap_or_else(in_order)))
         }
     }
 }
@@ -517,6 +548,41 @@ mod tests {
         };
         assert!(refused(3.02).contains("fits, but the floor"), "{}", refused(3.02));
         assert!(refused(2.98).contains("fits nowhere"), "{}", refused(2.98));
+    }
+
+    /// A point that is written twice changes nothing; two points that are nearly one and cross are named.
+    #[test]
+    fn repeated_points_are_one_or_named() {
+        let part = |points: &str| {
+            let text = format!(
+                "[part]\nsurface = \"pocket\"\noutline = [{points}]\ndepth = 2\n[cutter]\nshape = \"flat\"\ndiameter = 6\n\
+                 [[toolpath]]\nstrategy = \"pocket-offset\"\n"
+            );
+            Scene::parse("pocket.toml", text).map(|scene| scene.part)
+        };
+        let plain = part("[0, 0], [30, 0], [30, 20], [0, 20]").unwrap();
+        for points in [
+            "[0, 0], [30, 0], [30, 0], [30, 20], [0, 20], [0, 0]",
+            "[0, 0], [30, 0], [30, 1e-9], [30, 20], [0, 20]",
+            "[0, 0], [30, 0], [30, 20], [0, 20], [1e-9, -1e-9], [0, -1e-9]",
+        ] {
+            assert_eq!(part(points).unwrap(), plain, "{points}");
+        }
+        for (points, named) in [
+            (
+                "[0, 0], [30, 0], [30, 20], [0, 20], [0.004, -0.003]",
+                "[0.004, -0.003] and [0, 0] lie 0.0050 mm apart",
+            ),
+            (
+                "[0, 0], [30, 0], [29.995, 0], [30, 20], [0, 20]",
+                "[30, 0] and [29.995, 0] lie 0.0050 mm apart",
+            ),
+        ] {
+            let refused = part(points).unwrap_err();
+            let cure = miette::Diagnostic::help(&refused).unwrap().to_string();
+            assert!(refused.to_string().contains("crosses itself at x"), "{refused}");
+            assert!(cure.contains(named) && cure.contains("delete one"), "{cure}");
+        }
     }
 
     #[test]

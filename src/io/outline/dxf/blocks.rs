@@ -4,8 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::{CodePair, Entity, items, section};
 
-/// Which layers are read. Names of layers are compared as DXF has it, whatever their case, but for the one
-/// that is asked for.
+/// Which layers are read. Names of layers are compared as DXF has it, whatever their case.
 pub struct Layers<'a> {
     /// The only one whose entities are wanted.
     pub wanted: Option<&'a str>,
@@ -35,7 +34,7 @@ impl<'a> Layers<'a> {
     }
 
     pub fn is_wanted(&self, layer: &str) -> bool {
-        self.wanted.is_none_or(|wanted| wanted == layer)
+        self.wanted.is_none_or(|wanted| wanted.to_lowercase() == layer.to_lowercase())
     }
 
     fn shows(&self, layer: &str) -> bool {
