@@ -33,7 +33,7 @@
 //! area only.
 
 use super::eikonal::{Front, Window};
-use super::sparse::{Entry, Factor};
+use super::sparse::{Entry, Factor, Scratch};
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
@@ -141,23 +141,36 @@ impl Gradients {
 /// A quadratic form, small where a function is smooth: the sum of `weight · (Σ terms)²`.
 #[derive(Debug, Clone, Default)]
 pub struct Roughness {
-    rows: Vec<(f64, Vec<(u32, f64)>)>,
+    /// The weight of each row, and where its terms end.
+    rows: Vec<(f64, u32)>,
+    terms: Vec<(u32, f64)>,
 }
 
 impl Roughness {
     /// Adds a row of coefficients with what they are multiplied by.
-    pub fn push(&mut self, weight: f64, terms: Vec<(u32, f64)>) {
-        self.rows.push((weight, terms));
+    pub fn push(&mut self, weight: f64, terms: impl IntoIterator<Item = (u32, f64)>) {
+        self.terms.extend(terms);
+        self.rows.push((weight, self.terms.len() as u32));
+    }
+
+    /// The weight and the terms of each row.
+    fn rows(&self) -> impl Iterator<Item = (f64, &[(u32, f64)])> {
+        let mut first = 0;
+        self.rows.iter().map(move |&(weight, end)| {
+            let from = std::mem::replace(&mut first, end as usize);
+            (weight, &self.terms[from..end as usize])
+        })
     }
 
     /// That of functions whose coefficients are tied, by the unknowns.
     pub fn tied(&self, tied: &Tied) -> Self {
-        let row = |(weight, terms): &(f64, Vec<(u32, f64)>)| {
+        let mut roughness = Self::default();
+        for (weight, terms) in self.rows() {
             let fixed: f64 = terms.iter().map(|&(k, share)| tied.offsets[k as usize] * share).sum();
             let free = terms.iter().filter_map(|&(k, share)| Some((tied.unknowns[k as usize]?, share)));
-            (*weight, free.chain([(0, fixed)]).collect())
-        };
-        Self { rows: self.rows.iter().map(row).collect() }
+            roughness.push(weight, free.chain([(0, fixed)]));
+        }
+        roughness
     }
 }
 
@@ -249,29 +262,49 @@ pub fn minimise_priced(
     rounds: Rounds,
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
-    let problem = Problem { sites, gradients, roughness, end };
-    let Some(mut factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else {
-        return Ok(None);
-    };
-    let mut x = start;
-    let (first, last) = PENALTIES.split_at(PENALTIES.len() - 2);
-    for &penalty in if rounds == Rounds::First { first } else { last } {
-        problem.descend(&mut factor, penalty, &mut x, monitor)?;
+    let minimiser = Minimiser::new(sites, gradients, roughness);
+    minimiser.map_or(Ok(None), |minimiser| minimiser.run(end, start, rounds, monitor))
+}
+
+/// [`minimise_priced`] from any number of starts, which share one preconditioner: that depends on neither
+/// start nor price.
+pub struct Minimiser<'a> {
+    sites: &'a [Site],
+    gradients: &'a Gradients,
+    roughness: &'a Roughness,
+    factor: Factor<f64>,
+}
+
+impl<'a> Minimiser<'a> {
+    /// `None` where sites do not determine the function.
+    pub fn new(sites: &'a [Site], gradients: &'a Gradients, roughness: &'a Roughness) -> Option<Self> {
+        let factor = Problem { sites, gradients, roughness, end: 0.0 }.stiffness()?;
+        Some(Self { sites, gradients, roughness, factor })
     }
-    let (mut cost, mut ends, mut turning, mut passes, mut short) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (k, site) in sites.iter().enumerate() {
-        let q = gradients.at(k, &x);
-        let (length, shortfall) = site.length_and_shortfall(q);
-        let norm = q[0].hypot(q[1]).max(f64::MIN_POSITIVE);
-        ends += site.ends([q[0] / norm, q[1] / norm]).0;
-        passes += site.border.map_or(0.0, |along| 0.5 * (along[0] * q[0] + along[1] * q[1]).abs());
-        turning += site.area * Site::by_direction(site.turning, q, norm * norm).0 * norm;
-        let doubled = shortfall > DOUBLED;
-        cost += if doubled { 2.0 * length } else { length };
-        short += if doubled { length } else { 0.0 };
+
+    /// As [`minimise_priced`].
+    ///
+    /// # Errors
+    /// As [`minimise`].
+    pub fn run(
+        &self,
+        end: f64,
+        start: Vec<f64>,
+        rounds: Rounds,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Packed>, Cancelled> {
+        let Self { sites, gradients, roughness, ref factor } = *self;
+        let Some(mut scratch) = factor.scratch().filter(|_| start.len() == gradients.coefficients) else {
+            return Ok(None);
+        };
+        let problem = Problem { sites, gradients, roughness, end };
+        let mut x = start;
+        let (first, last) = PENALTIES.split_at(PENALTIES.len() - 2);
+        for &penalty in if rounds == Rounds::First { first } else { last } {
+            problem.descend((factor, &mut scratch), penalty, &mut x, monitor)?;
+        }
+        Ok(problem.packed(x))
     }
-    let sound = cost.is_finite() && x.iter().all(|x| x.is_finite());
-    Ok(sound.then(|| Packed { coefficients: x, cost, ends, turning, passes, short: short / cost }))
 }
 
 impl Site {
@@ -395,12 +428,30 @@ impl Problem<'_> {
                 by[k as usize] += slope[0] * share[0] + slope[1] * share[1];
             }
         }
-        for (weight, terms) in &self.roughness.rows {
+        for (weight, terms) in self.roughness.rows() {
             let row: f64 = terms.iter().map(|&(k, share)| share * x[k as usize]).sum();
             sum += weight * row * row;
             terms.iter().for_each(|&(k, share)| by[k as usize] += 2.0 * weight * row * share);
         }
         sum
+    }
+
+    /// What the passes of ψ cost; `None` where that is no number.
+    fn packed(&self, x: Vec<f64>) -> Option<Packed> {
+        let (mut cost, mut ends, mut turning, mut passes, mut short) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (k, site) in self.sites.iter().enumerate() {
+            let q = self.gradients.at(k, &x);
+            let (length, shortfall) = site.length_and_shortfall(q);
+            let norm = q[0].hypot(q[1]).max(f64::MIN_POSITIVE);
+            ends += site.ends([q[0] / norm, q[1] / norm]).0;
+            passes += site.border.map_or(0.0, |along| 0.5 * (along[0] * q[0] + along[1] * q[1]).abs());
+            turning += site.area * Site::by_direction(site.turning, q, norm * norm).0 * norm;
+            let doubled = shortfall > DOUBLED;
+            cost += if doubled { 2.0 * length } else { length };
+            short += if doubled { length } else { 0.0 };
+        }
+        let sound = cost.is_finite() && x.iter().all(|x| x.is_finite());
+        sound.then(|| Packed { coefficients: x, cost, ends, turning, passes, short: short / cost })
     }
 
     /// The factor of the equations of `∫ (c/s) |∇ψ|²` and the roughness, the first coefficient held: about
@@ -421,7 +472,7 @@ impl Problem<'_> {
                 }
             }
         }
-        for (weight, terms) in &self.roughness.rows {
+        for (weight, terms) in self.roughness.rows() {
             for &(a, ga) in terms {
                 for &(b, gb) in terms {
                     if a >= b && b > 0 {
@@ -436,7 +487,7 @@ impl Problem<'_> {
     /// Lowers the cost until nothing is left to gain.
     fn descend(
         &self,
-        factor: &mut Factor<f64>,
+        (factor, scratch): (&Factor<f64>, &mut Scratch),
         penalty: f64,
         x: &mut Vec<f64>,
         monitor: &dyn Monitor,
@@ -457,12 +508,12 @@ impl Problem<'_> {
                 add(&mut direction, change, -share);
                 shares.push(share);
             }
-            factor.solve(&mut direction[1..]);
+            factor.solve(scratch, &mut direction[1..]);
             direction[0] = 0.0;
             if let Some([step, change]) = memory.back() {
                 // The length of the last step along its change, as the preconditioner sees it.
                 let mut seen = change.clone();
-                factor.solve(&mut seen[1..]);
+                factor.solve(scratch, &mut seen[1..]);
                 seen[0] = 0.0;
                 let scale = dot(step, change) / dot(change, &seen);
                 direction.iter_mut().for_each(|d| *d *= scale);
@@ -667,14 +718,13 @@ mod tests {
         }
         let mut roughness = Roughness::default();
         (2..count).for_each(|k| {
-            roughness
-                .push(1.0 + k as f64, [(k as u32, 1.0), (k as u32 - 1, -2.0), (k as u32 - 2, 1.0)].into())
+            roughness.push(1.0 + k as f64, [(k as u32, 1.0), (k as u32 - 1, -2.0), (k as u32 - 2, 1.0)])
         });
         let form = |roughness: &Roughness, x: &[f64]| -> f64 {
-            let row = |(weight, terms): &(f64, Vec<(u32, f64)>)| {
+            let row = |(weight, terms): (f64, &[(u32, f64)])| {
                 weight * terms.iter().map(|&(k, share)| share * x[k as usize]).sum::<f64>().powi(2)
             };
-            roughness.rows.iter().map(row).sum()
+            roughness.rows().map(row).sum()
         };
         let (a, b) = (form(&roughness, &whole), form(&roughness.tied(&tied), &x));
         assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
@@ -691,6 +741,20 @@ mod tests {
         assert!((aslant - 2.0 * (0.5f64.sqrt() - SQUARE)).abs() < 0.03, "{aslant}");
         let along: f64 = problem.0.iter().map(|site| site.ends([1.0, 0.0]).0).sum();
         assert!((along - 1.0).abs() < 0.11, "{along}");
+    }
+
+    /// What starts share is the same to the bit as what each makes for itself.
+    #[test]
+    fn starts_that_share_a_preconditioner_end_where_each_ends_alone() {
+        let (sites, gradients) = square(|x, _, _| 0.05 * (1.0 + x), [1.0, 0.2, -0.1], true);
+        let rough = Roughness::default();
+        let shared = Minimiser::new(&sites, &gradients, &rough).unwrap();
+        for (angle, end) in [(0.2, 0.0), (1.1, 0.3), (2.3, 0.1)] {
+            let start = straight(angle, 15.0);
+            let alone =
+                minimise_priced(&sites, &gradients, &rough, end, start.clone(), Rounds::First, &Silent);
+            assert_eq!(shared.run(end, start, Rounds::First, &Silent), alone);
+        }
     }
 
     #[test]

@@ -19,9 +19,10 @@ pub(super) type Entry<T> = Triplet<u32, u32, T>;
 pub(super) struct Factor<T> {
     symbolic: SymbolicCholesky<u32>,
     values: Vec<T>,
-    /// For solving.
-    memory: MemBuffer,
 }
+
+/// What solving takes, one for each thread that solves.
+pub(super) struct Scratch(MemBuffer);
 
 impl<T: ComplexField> Factor<T> {
     /// Of the (Hermitian) matrix of `n` rows that has the sums of the given `entries` on and below its
@@ -45,18 +46,22 @@ impl<T: ComplexField> Factor<T> {
                 Default::default(),
             )
             .ok()?;
-        let memory = MemBuffer::try_new(symbolic.solve_in_place_scratch::<T>(1, Par::Seq)).ok()?;
-        Some(Self { symbolic, values, memory })
+        Some(Self { symbolic, values })
+    }
+
+    /// What [`Factor::solve`] takes; `None` where that is not to be had.
+    pub fn scratch(&self) -> Option<Scratch> {
+        MemBuffer::try_new(self.symbolic.solve_in_place_scratch::<T>(1, Par::Seq)).ok().map(Scratch)
     }
 
     /// Solves in place of a right side, which has a number for each row.
-    pub fn solve(&mut self, b: &mut [T]) {
+    pub fn solve(&self, scratch: &mut Scratch, b: &mut [T]) {
         let n = b.len();
         LltRef::<'_, u32, T>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(b, n, 1),
             Par::Seq,
-            MemStack::new(&mut self.memory),
+            MemStack::new(&mut scratch.0),
         );
     }
 }
@@ -64,7 +69,8 @@ impl<T: ComplexField> Factor<T> {
 /// Solves one system in place of its right side; see [`Factor::new`].
 pub(super) fn solve<T: ComplexField>(entries: &[Entry<T>], b: &mut [T]) -> Option<()> {
     if !b.is_empty() {
-        Factor::new(b.len(), entries)?.solve(b);
+        let factor = Factor::new(b.len(), entries)?;
+        factor.solve(&mut factor.scratch()?, b);
     }
     Some(())
 }

@@ -81,9 +81,19 @@ impl Corrected<'_> {
             (false, 0) => self.corrected(&self.tried, in_vain).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => self.corrected(last, in_vain).or_else(in_proportion),
             // Where all ridges hold, few places along borders are left.
-            (false, ..=MOST_IN_VAIN) => in_proportion().or_else(|| self.corrected(last, in_vain)),
+            (false, ..=MOST_IN_VAIN) => in_proportion()
+                .or_else(|| self.corrected(last, in_vain).filter(|_| self.may_reach_best(in_vain))),
             _ => None,
         }
+    }
+
+    /// Whether the plans that are left may come as low as the best one. Not where each takes as much as the last
+    /// one took of the one before, both in vain, and where that is not enough.
+    fn may_reach_best(&self, in_vain: usize) -> bool {
+        let left = (MOST_IN_VAIN + 1).saturating_sub(in_vain) as f64;
+        let best = self.tried.standing.round.highest();
+        let last = self.rounds.last_chunk::<2>().filter(|both| both.iter().all(|round| round.measured));
+        last.is_none_or(|[before, last]| falls_to(best, [before.highest(), last.highest()], left))
     }
 
     /// Few places that stand too high get passes of their own, once, or else those that were never cut.
@@ -257,6 +267,12 @@ impl Corrected<'_> {
     }
 }
 
+/// Whether a height that fell from one plan to the next comes down to another in so many more, falling by as
+/// much in each. Where it rose that tells nothing: what stands there was not looked at before.
+fn falls_to(height: f64, [before, last]: [f64; 2], plans: f64) -> bool {
+    last >= before || last - plans * (before - last) <= height
+}
+
 /// The places that may stand above the target.
 fn above_target(near: &[HighPlace]) -> Vec<HighPlace> {
     near.iter().filter(|place| place.over > 0.0).copied().collect()
@@ -270,4 +286,18 @@ pub(super) fn changes(factors: [f64; 2], others: [f64; 2]) -> [f64; 2] {
 /// of passes.
 pub(super) fn are_ends_alone(widths: f64, length: f64) -> bool {
     widths > 0.0 && (length - 1.0).abs() <= AS_BEFORE * widths
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_in_vain_go_on_while_they_may_come_down_to_the_best() {
+        // Narrower passes took a tenth of a wall in a round: two more do not take the rest.
+        assert!(!falls_to(0.94, [2.62, 2.40], 2.0));
+        assert!(falls_to(0.94, [2.62, 1.70], 2.0) && falls_to(0.94, [2.62, 2.05], 2.0));
+        // No plan tells the trend yet.
+        assert!(falls_to(0.94, [0.95, 2.62], 3.0) && falls_to(0.94, [2.40, 2.40], 1.0));
+    }
 }

@@ -12,7 +12,7 @@ use crate::surface::mesh_surface::MeshSurface;
 use crate::vocabulary::{Guide, Step, Task};
 use cutter::Cutter;
 use field::mesh::{Bend, gradient_terms};
-use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise_priced};
+use field::{Front, Gradients, Minimiser, Packed, Roughness, Rounds, Site};
 use geometry::Vector3;
 use work::monitor::Cancelled;
 use work::parallel;
@@ -99,8 +99,9 @@ pub(crate) fn shortest_streams(
     let roughness = roughness(surface, cutter, density);
     let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
     monitor.start("searching directions", (STARTS + usize::from(further.is_some()) + most) as u64);
+    let Some(minimiser) = Minimiser::new(&kept, &gradients, &roughness) else { return Ok(Vec::new()) };
     let minimise = |start: Vec<f64>, rounds: Rounds| {
-        let found = minimise_priced(&kept, &gradients, &roughness, prices.end, start, rounds, monitor);
+        let found = minimiser.run(prices.end, start, rounds, monitor);
         monitor.advance(1);
         found
     };

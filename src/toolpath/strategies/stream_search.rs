@@ -326,7 +326,7 @@ impl Search<'_> {
             {
                 for (share, [first, second]) in components {
                     let row = terms.iter().map(|(k, d1, d2)| (*k, dot(&first, d1) + dot(&second, d2)));
-                    roughness.push(bend * site.area * share, row.collect());
+                    roughness.push(bend * site.area * share, row);
                 }
             }
             kept.push(site);
