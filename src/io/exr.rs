@@ -1,7 +1,7 @@
 //! OpenEXR files of maps over a grid, full precision.
 //!
 //! Channels: `Z` height, mm, and `deviation`, mm (NaN off the part), 32-bit float; `move` the index of the
-//! move that cut a cell last, 32-bit whole number, 4294967295 where none did. Row 0 of the picture holds the
+//! move of the toolpath that cut a cell last, 32-bit whole number, 4294967295 where none of its moves did. Row 0 of the picture holds the
 //! greatest y, as pictures are looked at. One text attribute, `millstream`, holds JSON: `cell_mm`,
 //! `origin_mm` (centre of the cell at the lower left), `unit`.
 //!
@@ -17,25 +17,28 @@ use exr::prelude::{
 };
 
 use metrology::{NormalMap, PatchGrid};
-use sim::{Grid, ZMap};
+use sim::{Grid, NOT_CUT, ZMap};
 
 /// ZIP by lines. On the maps of the shipped scenes ZIP over 16 lines took half as long again for files
 /// 7 to 24 % smaller, PIZ took as long as that for files no smaller, and run lengths saved nothing.
 const ENCODING: Encoding =
     Encoding { compression: Compression::ZIP1, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
 
-/// The bytes of an EXR file. `deviation` is over the grid of `cut`.
+/// The bytes of an EXR file. `deviation` is over the grid of `cut`, whose moves before the `first` are those of
+/// other toolpaths.
 ///
 /// # Errors
 /// What the encoder says; [`io::ErrorKind::InvalidInput`] when the maps differ in size.
-pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
+pub fn encode(cut: &ZMap, deviation: &[f32], first: u32) -> io::Result<Vec<u8>> {
     let grid = &cut.grid;
     if [cut.height.len(), cut.cut_by.len(), deviation.len()] != [grid.len(); 3] {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the maps differ in size"));
     }
     let pixel = |Vec2(column, row): Vec2<usize>| {
         let cell = grid.index(column, grid.ny - 1 - row);
-        (cut.height[cell], deviation[cell], cut.cut_by[cell])
+        let by = Some(cut.cut_by[cell]).filter(|by| *by != NOT_CUT);
+        let own = by.and_then(|by| by.checked_sub(first)).unwrap_or(NOT_CUT);
+        (cut.height[cell], deviation[cell], own)
     };
     let channels = SpecificChannels::build()
         .with_channel("Z")
@@ -94,10 +97,7 @@ fn bytes_of<'i, L: WritableLayers<'i>>(image: &'i Image<L>) -> io::Result<Vec<u8
 fn description(grid: &Grid) -> String {
     format!(
         r#"{{"unit":"mm","cell_mm":{:?},"origin_mm":[{:?},{:?}],"rows":"greatest y first","move_none":{}}}"#,
-        grid.cell,
-        grid.origin.x,
-        grid.origin.y,
-        sim::NOT_CUT
+        grid.cell, grid.origin.x, grid.origin.y, NOT_CUT
     )
 }
 
@@ -114,16 +114,18 @@ mod tests {
         let cut_by = vec![0, 1, 2, 3, u32::MAX, 16_777_217];
         let cut = ZMap { height, cut_by, ..ZMap::block(grid, 0.0) };
         let deviation = [0.0, -0.25, f32::NAN, 1e-9, 0.5, 7.0];
-        let bytes = encode(&cut, &deviation).unwrap();
-        assert_eq!(bytes, encode(&cut, &deviation).unwrap(), "the same bytes every time");
-        let image = exr::prelude::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(Cursor::new(bytes))
-            .unwrap();
+        let bytes = encode(&cut, &deviation, 0).unwrap();
+        assert_eq!(bytes, encode(&cut, &deviation, 0).unwrap(), "the same bytes every time");
+        let read = |bytes: Vec<u8>| {
+            let layers = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+            layers.first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes)).unwrap()
+        };
+        // Moves before the first are those of other toolpaths.
+        let behind = read(encode(&cut, &deviation, 2).unwrap());
+        let moves = &behind.layer_data.channel_data.list[2].sample_data;
+        let none = u32::MAX;
+        assert_eq!(*moves, FlatSamples::U32(vec![1, none, 16_777_215, none, none, 0]));
+        let image = read(bytes);
         let channels = &image.layer_data.channel_data.list;
         let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
         assert_eq!(names, ["Z", "deviation", "move"]);

@@ -3,7 +3,7 @@
 use cutter::Solid;
 use metrology::{
     AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measured, Measurement,
-    REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, SweptVolume, View,
+    REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, RidgePlace, SweptVolume, UnseenSurface, View,
 };
 use motion::{Cutters, Toolpath};
 use report::Verdict;
@@ -39,6 +39,9 @@ pub(crate) struct Unseen {
     pub spacing_mm: f64,
     /// Whether a place was never cut: material then stands at least as high as is looked.
     pub never_cut: bool,
+    /// The places over which more stands than the scallop tolerance, with how much at least, and whether an
+    /// upright tool comes to them.
+    pub above: Vec<(RidgePlace, bool)>,
 }
 
 impl Session {
@@ -120,9 +123,9 @@ impl Session {
         let most = if self.verdict_on(measured) == Verdict::Fail { 0 } else { MOST_HALVINGS };
         loop {
             let found = coverage.measure_unseen(&task, monitor)?;
-            let unseen = found.map(|(measurement, spacing_mm)| {
+            let unseen = found.map(|UnseenSurface { measurement, spacing, above }| {
                 let never_cut = measurement.uncut.max_height_mm >= swept.reach();
-                Unseen { measurement, spacing_mm, never_cut }
+                Unseen { measurement, spacing_mm: spacing, never_cut, above }
             });
             let verdict = unseen
                 .as_ref()

@@ -8,16 +8,16 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use cutter::{Cutter, Holder};
-use geometry::{Point2, Point3};
-use metrology::View;
-use motion::{Cutters, PathsInTurn, ROUNDING, Toolpath};
-use scene::Scene;
-use sim::ZMap;
+use geometry::Point2;
+use metrology::{RidgePlace, View, cells_above};
+use motion::{Cutters, PathsInTurn, Toolpath};
 use toolpath::Rest;
+use work::monitor::Monitor;
 
-use super::Outcome;
 use super::judge::highest_reached;
+use super::run::Run;
 use super::tool::ToolMoves;
+use super::{JobError, Outcome};
 
 /// A toolpath that cut before another one.
 #[derive(Debug, Clone)]
@@ -30,35 +30,20 @@ pub(crate) struct EarlierPath {
     pub cutters: Cutters,
     /// What held each of them.
     pub holders: Vec<Option<Holder>>,
-    /// Where it and those before it left more than ridges may be.
-    pub left: Arc<Rest>,
+    /// Where it and those before it left more than ridges may be, if the next one is for that.
+    pub left: Option<Arc<Rest>>,
 }
 
 impl EarlierPath {
     /// What a toolpath left.
-    pub fn of(outcome: &Outcome, scene: &Scene) -> Self {
-        let Outcome { result, path, cutters, holders, measurement, view, .. } = outcome;
-        let left = match view {
-            View::Heights(ZMap { grid, .. }) => {
-                let limit = scene.tolerance.scallop;
-                let above = |deviation: &f32| f64::from(*deviation) > limit;
-                let stands = measurement.deviation_map.iter().map(above).collect();
-                let rest = Rest::new(grid.origin, grid.cell, [grid.nx, grid.ny], stands);
-                // Between the centres of cells, and along borders.
-                let highest = highest_reached(measurement);
-                let highest = highest.at_mm.map(|at| (Point3::from(at), highest.at_most()));
-                let places = measurement.above.iter().map(|place| (place.at, place.height)).chain(highest);
-                rest.and(places.filter(|(_, height)| *height > limit - 2.0 * ROUNDING).map(|(at, _)| at.xy()))
-            }
-            // No toolpath goes on behind these.
-            View::Normals(_) => Rest::new(Point2::origin(), 1.0, [0; 2], Vec::new()),
-        };
+    pub fn of(outcome: &Outcome) -> Self {
+        let Outcome { result, path, cutters, holders, rest, .. } = outcome;
         Self {
             name: result.name.clone(),
             path: path.clone(),
             cutters: cutters.clone(),
             holders: holders.clone(),
-            left: Arc::new(left),
+            left: rest.clone(),
         }
     }
 
@@ -67,6 +52,40 @@ impl EarlierPath {
         let stretches = self.cutters.stretches(&self.path).into_iter();
         stretches.map(|stretch| (*stretch.cutter, stretch.path.into_owned()))
     }
+}
+
+/// Where a toolpath and those before it left more than ridges may be, between the centres of cells and where
+/// none sees as well.
+///
+/// # Errors
+/// [`JobError`] when cancelled.
+pub(crate) fn left_over(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Rest, JobError> {
+    let View::Heights(cut) = run.view() else {
+        // No toolpath goes on behind these.
+        return Ok(Rest::new(Point2::origin(), 1.0, [0; 2], Vec::new()));
+    };
+    let Run { session, request, whole, .. } = *run;
+    let task = session.task(request, (&whole.path, &whole.cutters), &run.scene().simulation, &session.cells);
+    // Programs may be as far off the moves.
+    let limit = run.scene().tolerance.scallop - whole.path.origin.strays;
+    let between = cells_above(&task, cut, limit, monitor).map_err(run.heights())?;
+    let stands = run.measurement().deviation_map.iter().map(|height| f64::from(*height) > limit).collect();
+    let grid = cut.grid;
+    let rest = Rest::new(grid.origin, grid.cell, [grid.nx, grid.ny], stands).and_between(between);
+    let Some(unseen) = &run.covered.unseen else { return Ok(rest) };
+    let found = &unseen.measurement;
+    let highest = highest_reached(found);
+    let may_be_higher = highest.at_most() > limit;
+    let highest = highest.at_mm.map(|at| RidgePlace { at: at.into(), height: highest.max_mm });
+    let places = found.above.iter().filter(|place| place.height > limit);
+    let places: Vec<RidgePlace> = places.chain(highest.iter().filter(|_| may_be_higher)).copied().collect();
+    let feet = work::parallel::map(places.len(), |k| run.part().closest_point(&places[k].at).0);
+    let is_met = task.facing().meets(feet.len(), |k| (feet[k].point, feet[k].normal));
+    let all = unseen.above.iter().copied().chain(places.into_iter().zip(is_met));
+    let (open, closed): (Vec<_>, Vec<_>) = all.partition(|(_, is_met)| *is_met);
+    let closed = closed.into_iter().map(|(place, _)| (place.at, place.height));
+    let highest = closed.filter(|(_, height)| *height > limit).max_by(|a, b| a.1.total_cmp(&b.1));
+    Ok(rest.and(open.into_iter().map(|(place, _)| place.at.xy())).and_out_of_reach(highest))
 }
 
 /// The moves of a toolpath behind those of the toolpaths before it.
@@ -107,6 +126,11 @@ impl<'a> WholePath<'a> {
             tools.into_iter().map(move |tool| ToolMoves { first: tool.first + first, ..tool })
         };
         self.firsts.iter().zip(all).flat_map(behind).collect()
+    }
+
+    /// Index of the first move of the last toolpath.
+    pub fn own_first(&self) -> u32 {
+        self.firsts.last().copied().unwrap_or_default()
     }
 
     /// Which toolpath makes a move, and which of its moves it is.

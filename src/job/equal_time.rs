@@ -8,6 +8,7 @@
 
 use serde::Serialize;
 
+use motion::ROUNDING;
 use scene::{EqualTime, ToolpathRequest};
 use toolpath::Step;
 use work::monitor::Monitor;
@@ -35,6 +36,9 @@ const INSIDE: f64 = 0.1;
 /// The highest scallop, as a share of the cutter's corner radius: passes that leave higher ones hardly touch
 /// each other.
 const HIGHEST: f64 = 0.25;
+
+/// The lowest scallop, mm: programs write places no closer, so that passes for lower ones leave no lower ones.
+const LOWEST: f64 = ROUNDING;
 
 /// A plan of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -92,7 +96,9 @@ impl Session {
             let time = planned.time(scene, monitor)?;
             Ok::<_, JobError>((planned, time))
         };
-        let (mut planned, kept, plans) = nearest(scene.tolerance.scallop, highest, asked_s, &mut plan)?;
+        let lowest = LOWEST.min(scene.tolerance.scallop);
+        let (mut planned, kept, plans) =
+            nearest(scene.tolerance.scallop, [lowest, highest], asked_s, &mut plan)?;
         let TriedPlan { scallop_mm, machining_time_s } = kept;
         let figures = EqualTimeFigures {
             of: time.of.clone(),
@@ -102,15 +108,16 @@ impl Session {
             plans,
         };
         // Of heights that all take as long the first one is kept.
-        let were_highest = figures.plans.iter().any(|tried| tried.scallop_mm >= highest);
-        if machining_time_s > asked_s && !figures.is_met() && were_highest {
-            return Err(JobError::TooLittleTime {
-                scene: scene.source.name.clone(),
-                name: request.name.clone(),
-                least: (100.0 / 60.0 * machining_time_s).ceil() / 100.0,
-                highest,
-                asked: time.minutes,
-            });
+        let tried = |is_end: &dyn Fn(f64) -> bool| figures.plans.iter().any(|tried| is_end(tried.scallop_mm));
+        let (of, name) = (scene.source.name.clone(), request.name.clone());
+        let (asked, minutes) = (time.minutes, machining_time_s / 60.0);
+        if !figures.is_met() && machining_time_s > asked_s && tried(&|scallop| scallop >= highest) {
+            let least = (100.0 * minutes).ceil() / 100.0;
+            return Err(JobError::TooLittleTime { scene: of, name, least, highest, asked });
+        }
+        if !figures.is_met() && machining_time_s < asked_s && tried(&|scallop| scallop <= lowest) {
+            let most = (100.0 * minutes).floor() / 100.0;
+            return Err(JobError::TooMuchTime { scene: of, name, most, lowest, asked });
         }
         planned.equal_time = Some(figures);
         Ok((at(scallop_mm), planned))
@@ -118,23 +125,28 @@ impl Session {
 }
 
 /// The plan that is nearest to the time asked for, s, as it was tried, and all that were: by heights from
-/// `first` on, none above `highest`, mm.
+/// `first` on, none below `lowest` or above `highest`, mm.
 fn nearest<P, E>(
     first: f64,
-    highest: f64,
+    [lowest, highest]: [f64; 2],
     asked_s: f64,
     plan: &mut dyn FnMut(f64) -> Result<(P, f64), E>,
 ) -> Result<(P, TriedPlan, Vec<TriedPlan>), E> {
     let off = |tried: &TriedPlan| (tried.machining_time_s - asked_s).abs();
-    let (mut scallop_mm, least) = (first.min(highest), highest.sqrt().recip());
+    let mut scallop_mm = first.min(highest);
+    let [most, least] = [lowest, highest].map(|height| height.sqrt().recip());
     let (planned, machining_time_s) = plan(scallop_mm)?;
     let mut kept = TriedPlan { scallop_mm, machining_time_s };
     let (mut best, mut plans) = (planned, vec![kept]);
     while off(&kept) > WITHIN * asked_s
         && plans.len() < MOST_PLANS
-        && let Some(density) = next(&plans, asked_s, least)
+        && let Some(density) = next(&plans, asked_s, [least, most])
     {
-        scallop_mm = if density > least { density.powi(-2) } else { highest };
+        scallop_mm = match density {
+            density if density <= least => highest,
+            density if density >= most => lowest,
+            density => density.powi(-2),
+        };
         let (planned, machining_time_s) = plan(scallop_mm)?;
         let tried = TriedPlan { scallop_mm, machining_time_s };
         plans.push(tried);
@@ -145,8 +157,8 @@ fn nearest<P, E>(
     Ok((best, kept, plans))
 }
 
-/// The density to try next, not below `least`; `None` where none is likely to be nearer.
-fn next(plans: &[TriedPlan], asked_s: f64, least: f64) -> Option<f64> {
+/// The density to try next, not below `least` or above `most`; `None` where none is likely to be nearer.
+fn next(plans: &[TriedPlan], asked_s: f64, [least, most]: [f64; 2]) -> Option<f64> {
     let by_density = |a: &&TriedPlan, b: &&TriedPlan| a.density().total_cmp(&b.density());
     let quick = plans.iter().filter(|tried| tried.machining_time_s < asked_s).max_by(by_density);
     let slow = plans.iter().filter(|tried| tried.machining_time_s >= asked_s).min_by(by_density);
@@ -168,7 +180,8 @@ fn next(plans: &[TriedPlan], asked_s: f64, least: f64) -> Option<f64> {
         (slope > 0.0 && slope.is_finite()).then(|| last.density() + (asked_s - last.machining_time_s) / slope)
     });
     let wanted = secant.unwrap_or(proportional);
-    let bounded = wanted.clamp(last.density() / MOST_STRETCH, last.density() * MOST_STRETCH).max(least);
+    let bounded = wanted.clamp(last.density() / MOST_STRETCH, last.density() * MOST_STRETCH);
+    let bounded = bounded.min(most).max(least);
     ((bounded / last.density() - 1.0).abs() > f64::EPSILON).then_some(bounded)
 }
 
@@ -181,7 +194,7 @@ mod tests {
     /// The search over a time that is known for each density.
     fn search(asked: f64, time: impl Fn(f64) -> f64) -> (TriedPlan, usize) {
         let mut plan = |scallop: f64| Ok::<_, ()>((scallop, time(scallop.sqrt().recip())));
-        let (best, kept, plans) = nearest(0.01, 0.75, asked, &mut plan).unwrap();
+        let (best, kept, plans) = nearest(0.01, [LOWEST, 0.75], asked, &mut plan).unwrap();
         assert_eq!(best, kept.scallop_mm);
         (kept, plans.len())
     }
@@ -211,6 +224,8 @@ mod tests {
     fn passes_are_never_wider_than_the_highest_scallop_has_them() {
         let (kept, _) = search(1.0, |density| 50.0 + density);
         assert_eq!(kept.scallop_mm, 0.75);
+        let (kept, plans) = search(1e7, |density| 50.0 + density);
+        assert!(kept.scallop_mm == LOWEST && plans <= 4, "{kept:?} {plans}");
     }
 
     fn session(minutes: &str, toolpaths: &str) -> Session {
@@ -266,5 +281,19 @@ mod tests {
         assert!(error.why_not_planned().unwrap().contains("larger `minutes`"));
         let refused = error.to_string();
         assert!(refused.contains("minutes or more") && refused.contains("0.01 were asked for"), "{refused}");
+    }
+
+    /// Passes for the lowest ridges that a program can tell apart are 35 µm apart: 87 of 4 mm.
+    #[test]
+    fn a_time_that_no_plan_can_need_is_a_row_with_its_reason() {
+        let text = "[part]\nsurface = \"plane\"\nx = [0, 4]\ny = [0, 3]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                    [compare]\nminutes = 1e5\n[[toolpath]]\nstrategy = \"zigzag\"\n";
+        let session = Session::new(Scene::parse("plate.toml", text.to_owned()).unwrap()).unwrap();
+        let error = session.run(&Silent).map(|report| report.verdict).unwrap_err();
+        let JobError::TooMuchTime { most, lowest, asked, .. } = &error else { panic!("{error}") };
+        assert!(*lowest == 5e-5 && *asked == 1e5 && (0.3..3.0).contains(most), "{error}");
+        let help = miette::Diagnostic::help(&error).unwrap().to_string();
+        assert!(help.ends_with("or less in [compare]"), "{help}");
+        assert!(error.why_not_planned().unwrap().contains("smaller `minutes`"));
     }
 }

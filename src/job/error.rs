@@ -81,6 +81,23 @@ pub enum JobError {
         /// The time that was asked for, minutes.
         asked: f64,
     },
+    /// No plan of a toolpath takes as much time as it is compared at.
+    #[error(
+        "{scene}: the toolpath \"{name}\" takes {most:.2} minutes or less, at scallops of {lowest} mm still, and {asked} were asked for"
+    )]
+    #[diagnostic(help("write `minutes = {most:.2}` or less in [compare]"))]
+    TooMuchTime {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// The most time that was found, minutes, rounded down.
+        most: f64,
+        /// The scallops that it leaves, mm.
+        lowest: f64,
+        /// The time that was asked for, minutes.
+        asked: f64,
+    },
     /// The machine cannot run a toolpath.
     #[error("{scene}: the machine cannot run the toolpath \"{name}\": {reason}")]
     #[diagnostic(help("change [machine.kinematics] or that [[toolpath]] in the scene"))]
@@ -250,6 +267,10 @@ impl JobError {
             Self::Plan { reason, .. } => Some(reason.to_string()),
             Self::TooLittleTime { least, highest, asked, .. } => Some(format!(
                 "it takes {least:.2} minutes or more, at scallops of {highest} mm already, and {asked} were asked for; write larger \
+                 `minutes` in [compare]"
+            )),
+            Self::TooMuchTime { most, lowest, asked, .. } => Some(format!(
+                "it takes {most:.2} minutes or less, at scallops of {lowest} mm still, and {asked} were asked for; write smaller \
                  `minutes` in [compare]"
             )),
             Self::Machine { reason, .. } => Some(format!("the machine cannot run it: {reason}")),

@@ -2,7 +2,9 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
+use std::sync::Arc;
 
+use geometry::Vector3;
 use io::digest;
 use metrology::{Engine, Measured, Measurement, ScallopFigures};
 use motion::Toolpath;
@@ -14,7 +16,7 @@ use scene::ToolpathRequest;
 use work::monitor::{self, Monitor};
 
 use super::correction::Looked;
-use super::earlier::{EarlierPath, WholePath};
+use super::earlier::{EarlierPath, WholePath, left_over};
 use super::gouge_moves::{self, OwnMoves};
 use super::measuring::Closeness;
 use super::planned::Planned;
@@ -63,7 +65,7 @@ impl Session {
                     note_same_path(&mut seen, &mut outcome);
                     done(&outcome)?;
                     if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
-                        earlier.push(EarlierPath::of(&outcome, &self.scene));
+                        earlier.push(EarlierPath::of(&outcome));
                     }
                     if request.stock_is_previous {
                         answers_later(rows.last_mut(), &left, &request.name);
@@ -113,7 +115,7 @@ impl Session {
         let mut earlier = Vec::new();
         for before in all[first..own].iter().filter(|_| request.stock_is_previous) {
             let outcome = self.toolpath_after(&earlier, before, monitor)?;
-            earlier.push(EarlierPath::of(&outcome, &self.scene));
+            earlier.push(EarlierPath::of(&outcome));
         }
         self.toolpath_after(&earlier, request, monitor)
     }
@@ -132,7 +134,7 @@ impl Session {
         let fixtures = self.fixtures(monitor)?;
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
-        let rest = earlier.last().filter(|_| request.rest).map(|before| &before.left);
+        let rest = earlier.last().filter(|_| request.rest).and_then(|before| before.left.as_ref());
         let around = Around { tool: &tool, near, fixtures: &fixtures, rest };
         let at_time;
         let (request, planned, mut measured, covered) = match &request.equal_time {
@@ -189,6 +191,8 @@ impl Session {
         let found = figures::all(&run, monitor)?;
         let machined = Machined::new(&run);
         let [claims, left] = self.claims(&run, found.claims);
+        let first_move = whole.own_first();
+        let rest = self.rest_follows(request).then(|| left_over(&run, monitor)).transpose()?.map(Arc::new);
         let measurement = &measured.measurement;
         let unseen = covered.unseen.as_ref().map(|unseen| &unseen.measurement);
         let result = ToolpathResult {
@@ -198,7 +202,7 @@ impl Session {
             stock_is_previous: request.stock_is_previous,
             verdict: Verdict::by(&claims),
             claims,
-            notes: self.notes_on(&planned, &measured, found.notes),
+            notes: self.notes_on(request, &planned, &measured, found.notes),
             path: planned.path_figures(&self.scene, monitor)?,
             scallop: self.scallop_figures(request, measurement, unseen),
             gouge: unseen
@@ -221,9 +225,11 @@ impl Session {
             field: plan.field,
             measurement: measured.measurement,
             view: measured.view,
+            first_move,
             machined,
             files: found.files,
             left,
+            rest,
         })
     }
 
@@ -296,9 +302,39 @@ impl Session {
     }
 
     /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
-    fn notes_on(&self, planned: &Planned, measured: &Measured, figures: Vec<String>) -> Vec<String> {
+    fn notes_on(
+        &self,
+        request: &ToolpathRequest,
+        planned: &Planned,
+        measured: &Measured,
+        figures: Vec<String>,
+    ) -> Vec<String> {
         let first = self.notes.iter().chain(&measured.note).chain(&measured.measurement.refined.note);
-        first.chain(&planned.plan.notes).cloned().chain(figures).collect()
+        let back = if request.tilts() { None } else { self.looks_down() };
+        back.into_iter().chain(first.chain(&planned.plan.notes).cloned()).chain(figures).collect()
+    }
+
+    /// Says so where upright tools come to the back of an open surface. Which side is milled follows from the
+    /// sections of a blade: it is not turned over as a mesh is.
+    fn looks_down(&self) -> Option<String> {
+        /// Closed parts, and open ones that curl, have as much area on both sides.
+        const MOSTLY: f64 = 0.5;
+        let mesh = self.part.mesh();
+        mesh.surface().ok()?;
+        let areas: Vec<Vector3> = (0..mesh.triangles().len())
+            .map(|t| {
+                let [a, b, c] = mesh.corners(t);
+                (b - a).cross(&(c - a))
+            })
+            .collect();
+        let sum = |of: &dyn Fn(&Vector3) -> f64| areas.iter().fold(0.0, |sum, area| sum + of(area));
+        let down = sum(&|area| if area.z < 0.0 { area.norm() } else { 0.0 });
+        (-sum(&|area| area.z) > MOSTLY * sum(&|area| area.z.abs())).then(|| {
+            format!(
+                "{:.0} % of the part's surface looks down, and an upright tool cuts that from its back; turn the part over",
+                100.0 * down / sum(&Vector3::norm)
+            )
+        })
     }
 }
 

@@ -4,7 +4,7 @@ use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use metrology::GougeRegion;
 use motion::{Cutters, Toolpath};
-use sim::NOT_CUT;
+use sim::{Envelope, NOT_CUT};
 
 use super::earlier::{EarlierPath, WholePath};
 
@@ -25,7 +25,13 @@ pub(crate) fn name(
 ) {
     for region in regions.iter_mut().filter(|region| region.move_index != NOT_CUT) {
         let at = region.at_mm.into();
-        let (toolpath, move_index) = whole.own_move(region.move_index);
+        let (mut toolpath, mut move_index) = whole.own_move(region.move_index);
+        // What cut deepest may have cut behind the face only, which another toolpath came through.
+        let is_own = toolpath == earlier.len();
+        let through = if is_own { None } else { came_through(whole, region.move_index, &at) };
+        if let Some(own) = through.map(|by| whole.own_move(by)).filter(|own| own.0 > toolpath) {
+            (toolpath, move_index) = own;
+        }
         let its = earlier.get(toolpath);
         let OwnMoves { path, cutters } =
             its.map_or(own, |before| OwnMoves { path: &before.path, cutters: &before.cutters });
@@ -35,6 +41,14 @@ pub(crate) fn name(
         region.toolpath = its.map(|before| before.name.clone());
         region.program = its.map(|before| before.path.program_name().to_owned());
     }
+}
+
+/// The lowest of all moves over a place of the design where the one that cut deepest stays above it.
+fn came_through(whole: &WholePath<'_>, deepest: u32, at: &Point3) -> Option<u32> {
+    let envelope = Envelope::new(&whole.cutters, &whole.path);
+    let stays_above = envelope.height(deepest, at.x, at.y).is_none_or(|height| height > at.z);
+    let all: Vec<u32> = (0..whole.path.len() as u32).collect();
+    envelope.lowest(at.x, at.y, &all).map(|(_, by)| by).filter(|_| stays_above)
 }
 
 /// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line

@@ -9,6 +9,7 @@ use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
 use motion::{Cutters, Toolpath};
 use report::{Claim, FigureFile, ToolpathResult};
+use toolpath::Rest;
 
 use super::planned::write_program;
 use super::{Machined, Session};
@@ -32,14 +33,18 @@ pub struct Outcome {
     pub field: Option<Arc<PlannedField>>,
     /// The figures with their maps and samples.
     pub measurement: Measurement,
-    /// What they were found in.
+    /// What they were found in. Moves are counted from the first of the toolpaths that cut the same stock.
     pub view: View,
+    /// Which of those moves is the first of this toolpath.
+    pub first_move: u32,
     /// The machined part as triangles.
     pub machined: Machined,
     /// Further files of its folder.
     pub files: Vec<FigureFile>,
     /// The limits of what it leaves to the toolpath behind it.
     pub(crate) left: Vec<Claim>,
+    /// Where it and those before it left too much, if the toolpath behind it is for that.
+    pub(crate) rest: Option<Arc<Rest>>,
 }
 
 impl Session {

@@ -16,6 +16,7 @@
 //! nothing beyond them counts. Squares that may hold more than is known are divided until none does by more
 //! than was asked.
 
+mod cells_above;
 mod outline;
 mod patch;
 
@@ -31,6 +32,8 @@ use motion::ROUNDING;
 use patch::{Held, LEAST_HALF, Patches, STEEPEST, around};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
+
+pub use cells_above::cells_above;
 
 /// Squares looked at in search of one figure. Each takes some 10 µs; with fewer, wide bounds stay.
 const MOST: usize = 400_000;

@@ -150,6 +150,17 @@ impl<'a> Facing<'a> {
         runs.into_iter().flatten().collect()
     }
 
+    /// Which of many places with their outward unit normals an upright tool comes to, in their order.
+    pub fn meets(&self, count: usize, place: impl Fn(usize) -> (Point3, Vector3) + Sync) -> Vec<bool> {
+        let kinds = self.kinds(count, &place);
+        let is_open = |k: usize| match kinds[k] {
+            PlaceKind::Facing => true,
+            PlaceKind::Wall => !self.is_hidden_wall(&place(k).0, &place(k).1),
+            PlaceKind::FacingAway | PlaceKind::Hidden | PlaceKind::OutsideStock => false,
+        };
+        parallel::map(count, is_open)
+    }
+
     /// The kind of one place; `last` is the axis that is looked at first, and that which faced the place.
     fn kind(&self, point: &Point3, normal: &Vector3, last: &mut usize) -> PlaceKind {
         let near = self.part.mesh_deviation() + ABOVE;

@@ -72,13 +72,14 @@ pub use along_normals::{
     measure_along_normals, net_places,
 };
 pub use contact::contacts_on_patches;
-pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
+pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures, UnseenSurface};
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs};
 pub use engines::{
     BYTES_PER_TRIANGLE, Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured,
     NormalView, REACH_OVER_UNCUT, Simulation, Task, View,
 };
+pub use excess::cells_above;
 pub use facing::{Facing, Judged, PlaceKind};
 pub use figures::{
     Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,

@@ -23,7 +23,7 @@ use super::tracks::Tracks;
 use super::walls::{WallTask, Walls};
 use super::{Facing, REACH_OVER_UNCUT};
 use cutter::Cutter;
-use geometry::{Point3, Vector3};
+use geometry::{Aabb, Point3, Vector3};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{CutError, Envelope, ZMap};
@@ -70,18 +70,8 @@ pub(crate) fn measure_with_walls(
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
     let bound = asked.error_bound;
     let grid = cut.grid;
-    let walls = match facing {
-        Some(facing) => {
-            let (envelope, reach) =
-                (&surface.envelope, (REACH_OVER_UNCUT * limits.uncut).max(cutters.greatest_radius()));
-            let task = WallTask { part, cutters, path, envelope, grid, facing, limits, reach, asked: bound };
-            Walls::measure(&task, monitor)?
-        }
-        None => None,
-    };
-    let mut around = part.bounds();
-    around.max.z = around.max.z.max(asked.stock_top);
-    let every_move = EveryMove::new(&surface, cutters, &around);
+    let walls = walls_of(part, cutters, path, (&surface, limits, bound), facing, monitor)?;
+    let every_move = EveryMove::new(&surface, cutters, &up_to(part, asked.stock_top));
     let creases = Creases::new(part);
     let edges = asked.border_cuts.then(|| Borders::new(part, cutters));
     let inspection = Inspection {
@@ -145,6 +135,29 @@ pub(crate) fn measure_with_walls(
         walls.add_to(&mut measured, limits);
     }
     Ok(measured)
+}
+
+/// The vertical walls of a part, where they are asked for, with the error bound that is asked for, mm.
+pub(super) fn walls_of(
+    part: &Part,
+    cutters: &Cutters,
+    path: &Toolpath,
+    (surface, limits, asked): (&CutSurface<'_>, &Limits, f64),
+    facing: Option<&Facing<'_>>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Walls>, CutError> {
+    let Some(facing) = facing else { return Ok(None) };
+    let (envelope, grid) = (&surface.envelope, surface.cut.grid);
+    let reach = (REACH_OVER_UNCUT * limits.uncut).max(cutters.greatest_radius());
+    let task = WallTask { part, cutters, path, envelope, grid, facing, limits, reach, asked };
+    Ok(Walls::measure(&task, monitor)?)
+}
+
+/// The box around a part, up to the stock's top.
+pub(super) fn up_to(part: &Part, stock_top: f64) -> Aabb {
+    let mut around = part.bounds();
+    around.max.z = around.max.z.max(stock_top);
+    around
 }
 
 /// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others

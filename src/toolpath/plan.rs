@@ -169,9 +169,8 @@ fn plan_on(
         let added = touch_up::passes(task, &kept.passes)?;
         Ok((kept, added))
     })?;
-    let rest_is_empty = settings.places.rest.as_ref().is_some_and(|rest| rest.is_empty());
-    let empty = rest_is_empty.then(|| "the toolpaths before left nothing above the scallop tolerance".into());
-    let further = touch_up::note(&added).into_iter().chain(empty).collect();
+    let of_rest = settings.places.rest.as_ref().and_then(|rest| rest.note());
+    let further = touch_up::note(&added).into_iter().chain(of_rest).collect();
     let all = kept.passes.iter().cloned().chain(added).collect();
     let all = deeper(all, cutter, settings);
     let path = join(by_levels(all, &setup)?, strategy.both_ways(), &setup)?;

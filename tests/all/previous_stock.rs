@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use exr::prelude::{FlatSamples, ReadChannels as _, ReadLayers as _};
 use millstream::geometry::Point3;
 use serde_json::Value;
 
@@ -56,8 +57,20 @@ fn a_finish_begins_with_what_roughing_left() {
     // Every ridge of the finish lies under those of roughing, or is cut lower by it.
     let closed = 3.0 - (9.0f64 - 0.04).sqrt();
     assert!((number(finish, "/excess/max_mm") - closed).abs() < 1e-3, "{}", finish["excess"]);
-    // Lengths and program are those of its own moves.
+    // Lengths and program are those of its own moves, and so is what cut each cell.
     assert_eq!(finish["path"], alone["path"]);
+    let cut_by = |name: &str| {
+        let layers = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+        let file = home.path().join(format!("out/{name}/height.exr"));
+        let image = layers.first_valid_layer().all_attributes().from_file(file).unwrap();
+        let FlatSamples::U32(moves) = &image.layer_data.channel_data.list[2].sample_data else { panic!() };
+        moves.clone()
+    };
+    // Where passes of both lie at the design the first of them cut.
+    let moves = cut_by("finish");
+    let own: Vec<u32> = moves.iter().copied().filter(|by| *by != u32::MAX).collect();
+    assert!(own.len() > moves.len() / 2, "{}", own.len());
+    assert!(own.iter().all(|by| f64::from(*by) < number(finish, "/simulation/moves")), "{own:?}");
     let program =
         |name: &str| std::fs::read_to_string(home.path().join(format!("out/{name}/toolpath.nc"))).unwrap();
     assert_eq!(program("finish").lines().count(), program("alone").lines().count());
@@ -83,6 +96,38 @@ fn a_gouge_of_an_earlier_toolpath_is_named() {
     let text = report["toolpaths"][1]["violations"].to_string();
     assert!(text.contains("of the toolpath rough before this one, rough.nc line 6"), "{text}");
     assert_eq!(report["toolpaths"][1]["gouge"]["regions"][0]["program"], "rough.nc");
+}
+
+/// A side of a blade that looks down is cut from its back: roughing that leaves an allowance there opens
+/// nothing, and what the finish opens is the finish's gouge.
+#[test]
+fn a_cut_from_the_back_is_of_the_toolpath_that_came_through() {
+    let home = tempfile::tempdir().unwrap();
+    let station = |height: u32| format!("[[station]]\nheight = {height}\nnaca = \"4418\"\nchord = 12\n");
+    let blade = "sections = 4\npoints = 40\ntrailing_edge = { radius = 0.5 }\n";
+    std::fs::write(home.path().join("blade.toml"), format!("{blade}{}{}", station(0), station(2))).unwrap();
+    let scene = |rotate: &str| {
+        format!(
+            "[part]\nsections = \"blade.toml\"\nside = \"suction\"\nrotate = {rotate}\njudge = \"all\"\n[cutter]\n\
+             shape = \"ball\"\ndiameter = 4\n[tolerance]\nscallop = 0.05\ncorrect = false\n[stock]\nmargin = 3\n[simulation]\ncell = 0.2\n\
+             removal = false\nerror_bound = 0.05\nmemory_mib = 64\n[[toolpath]]\nname = \"rough\"\nstrategy = \"zigzag\"\n\
+             stepover = 2\nallowance = 0.3\n[[toolpath]]\nname = \"finish\"\nstrategy = \"zigzag\"\nstepover = 0.5\n{PREVIOUS}"
+        )
+    };
+    let looks_down = |toolpath: &Value| {
+        toolpath["notes"].to_string().contains("of the part's surface looks down, and an upright tool")
+    };
+    let (code, report) = run(home.path(), &scene("[-90, 0, 0]"));
+    let [rough, finish] = [0, 1].map(|k| &report["toolpaths"][k]);
+    assert!(code == Some(1) && looks_down(rough) && looks_down(finish), "{report}");
+    assert_eq!(number(rough, "/gouge/max_depth_mm"), 0.0, "{}", rough["gouge"]);
+    assert!(number(finish, "/gouge/max_depth_mm") > 1.0, "{}", finish["gouge"]);
+    let regions = finish["coverage"]["unseen"]["gouge"]["regions"].as_array().unwrap();
+    let moves = number(finish, "/simulation/moves");
+    let is_own = |region: &Value| region.get("toolpath").is_none() && number(region, "/move") < moves;
+    assert!(!regions.is_empty() && regions.iter().all(is_own), "{regions:?}");
+    let (_, report) = run(home.path(), &scene("[90, 0, 0]"));
+    assert!(!looks_down(&report["toolpaths"][1]), "{report}");
 }
 
 /// A wall of 5 × 8 mm that leans by so much, mm, and the level ground behind it.
@@ -336,6 +381,57 @@ fn a_small_cutter_cuts_the_rest_alone() {
     };
     let nearest = places.map(from_crest).fold(f64::INFINITY, f64::min);
     assert!(nearest > 0.8, "{nearest}");
+}
+
+/// Ridges of 33.19 µm that stand 5 µm beside the centre of a cell or farther: all of these are below the limit.
+#[test]
+fn a_rest_cuts_what_stands_between_cells() {
+    let home = tempfile::tempdir().unwrap();
+    let plate = PLATE.replace("cell = 0.1", "cell = 0.2\n[tolerance]\nscallop = 0.0325");
+    let passes = "[[toolpath]]\nname = \"passes\"\nstrategy = \"zigzag\"\nstepover = 0.89\n";
+    let rest = format!("[[toolpath]]\nname = \"rest\"\nstrategy = \"zigzag\"\n{PREVIOUS}rest = true\n");
+    let (code, report) = run(home.path(), &format!("{plate}{passes}{rest}"));
+    let [passes, rest] = [0, 1].map(|k| &report["toolpaths"][k]);
+    let closed = 3.0 - (9.0 - 0.445f64.powi(2)).sqrt();
+    assert!((number(passes, "/excess/max_mm") - closed).abs() < 1e-5, "{}", passes["excess"]);
+    assert_eq!((code, rest["verdict"].as_str()), (Some(0), Some("pass")), "{rest}");
+    assert!(number(rest, "/excess/max_mm") < 0.0325, "{}", rest["excess"]);
+}
+
+/// The underside of a T is judged, and no tool from above comes to it.
+#[test]
+fn a_rest_says_what_it_cannot_come_to() {
+    let home = tempfile::tempdir().unwrap();
+    let outline = [
+        [0.0, 0.0],
+        [6.0, 0.0],
+        [6.0, -1.0],
+        [4.0, -1.0],
+        [4.0, -3.0],
+        [2.0, -3.0],
+        [2.0, -1.0],
+        [0.0, -1.0],
+    ];
+    let ring = |y: f64| outline.map(|[x, z]| Point3::new(x, y, z));
+    let (front, back) = (ring(0.0), ring(4.0));
+    let sides = (0..8).flat_map(|k| {
+        let n = (k + 1) % 8;
+        [[front[k], back[n], back[k]], [front[k], front[n], back[n]]]
+    });
+    let caps = [[0, 1, 2], [0, 2, 3], [0, 3, 6], [0, 6, 7], [3, 4, 5], [3, 5, 6]];
+    let ends = caps.iter().flat_map(|t| [t.map(|k| back[k]), [front[t[0]], front[t[2]], front[t[1]]]]);
+    write_stl(&home.path().join("t.stl"), &sides.chain(ends).collect::<Vec<_>>());
+    let plan = "strategy = \"zigzag\"\n";
+    let scene = format!(
+        "[part]\nfile = \"t.stl\"\njudge = \"all\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n\
+         [simulation]\ncell = 0.1\n[[toolpath]]\nname = \"top\"\n{plan}[[toolpath]]\nname = \"rest\"\n{plan}{PREVIOUS}rest = true\n"
+    );
+    let (code, report) = run(home.path(), &scene);
+    let rest = &report["toolpaths"][1];
+    let notes = rest["notes"].to_string();
+    assert_eq!(code, Some(1), "{report}");
+    assert!(notes.contains("that an upright tool comes to; they left 2000 µm at"), "{notes}");
+    assert!(notes.contains("on a face that looks down or lies below others"), "{notes}");
 }
 
 /// Two toolpaths share a plate at x = 6; around an island nothing is cut by the first.

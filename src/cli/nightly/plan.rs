@@ -117,8 +117,12 @@ fn find(paths: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, CliError> {
             found.push((printable(&stem), path.clone()));
         }
     }
-    let mut scenes = BTreeMap::new();
+    let (mut scenes, mut places) = (BTreeMap::new(), BTreeSet::new());
     for (name, path) in found {
+        // The same file is one scene, however often it is named.
+        if !places.insert(place(&path)) {
+            continue;
+        }
         if let Some(other) = scenes.insert(name.clone(), path.clone()) {
             let what = format!("{} and {} are both named {name}", other.display(), path.display());
             return Err(CliError::nightly(what, "name a folder that both are in"));
@@ -133,6 +137,13 @@ fn find(paths: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, CliError> {
         ));
     }
     Ok(scenes)
+}
+
+/// The same for every way to name a file. A link is a file of its own.
+fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    path.file_name().map_or_else(|| path.to_owned(), |name| folder.join(name))
 }
 
 /// Adds the scenes of a folder. Hidden files and links to folders are left out.
@@ -157,14 +168,14 @@ fn search(folder: &Path, prefix: &str, found: &mut Vec<(String, PathBuf)>) -> Re
 }
 
 /// Whether a TOML file is a scene: rules and tables of blade sections are none. What cannot be read is one,
-/// and its run says what is wrong.
+/// and so is what holds nothing, or no more than a title: its run says what is wrong.
 fn is_scene(path: &Path) -> bool {
     let text = regular::read(path, MAX_SCENE_BYTES).ok().and_then(|bytes| String::from_utf8(bytes).ok());
     let Some(text) = text else { return true };
     let source = SceneText::new(path.to_string_lossy(), text);
     let Ok(table) = source.table() else { return true };
     let root = Section::root(&source, table.get_ref());
-    ["part", "cutter", "toolpath"].iter().any(|key| root.has(key))
+    table.get_ref().is_empty() || ["title", "part", "cutter", "toolpath"].iter().any(|key| root.has(key))
 }
 
 fn listed(names: impl Iterator<Item = impl AsRef<str>>) -> String {
@@ -210,6 +221,30 @@ fn case_digest(case: &Case, path: &Path, scene: Option<&Scene>, program: &str) -
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A scene that was cut off to nothing, or to its title, fails instead of being left out.
+    #[test]
+    fn files_that_are_named_twice_are_one_scene_and_broken_ones_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("more")).unwrap();
+        let part = "[part]\nsurface = \"plane\"\n";
+        let files = [
+            ("good.toml", part),
+            ("empty.toml", ""),
+            ("spaces.toml", "\n# nothing\n"),
+            ("title.toml", "title = \"a\"\n"),
+            ("rules.toml", "[[check]]\nscene = \"good\"\n"),
+            ("more/good.toml", part),
+        ];
+        files.iter().for_each(|(name, text)| fs::write(at(name), text).unwrap());
+        let all = ["empty", "good", "more/good", "spaces", "title"];
+        let again = [folder.path().to_owned(), at("good.toml"), at("more/../good.toml"), at("more")];
+        let found = find(&again).unwrap();
+        assert!(found.keys().eq(all), "{found:?}");
+        let refused = find(&[at("good.toml"), at("more/good.toml")]).unwrap_err().to_string();
+        assert!(refused.contains("both named good"), "{refused}");
+    }
 
     /// Without running them: every row of the shipped file names a toolpath of a shipped scene, and every
     /// scene has a row.

@@ -65,7 +65,7 @@ impl Maps<'_> {
     fn of_heights(&self, cut: &ZMap) -> Result<ToolpathPage, CliError> {
         let exr = || {
             let name = self.file("height.exr");
-            let bytes = exr::encode(cut, &self.outcome.measurement.deviation_map)
+            let bytes = exr::encode(cut, &self.outcome.measurement.deviation_map, self.outcome.first_move)
                 .map_err(CliError::output(Path::new(&name)))?;
             self.outputs.file(&name, |out| out.write_all(&bytes))
         };

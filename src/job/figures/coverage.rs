@@ -48,7 +48,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         ("Coverage", format!("the verdict of {} covers {}", run.request.name, covered(&areas.scope)))
     });
     let rows = rows(areas);
-    let unseen = unseen.as_ref().map(|Unseen { measurement, spacing_mm, never_cut }| UnseenValue {
+    let unseen = unseen.as_ref().map(|Unseen { measurement, spacing_mm, never_cut, .. }| UnseenValue {
         spacing_mm: *spacing_mm,
         places: measurement.deviation_map.len(),
         scallop: &measurement.scallop,

@@ -24,9 +24,9 @@ use geometry::{Point2, Point3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
 
-use super::along_normals::{Along, Net, NetPlace, Site, SweptVolume};
+use super::along_normals::{Along, AlongNormal as _, Net, NetPlace, Site, SweptVolume};
 use super::facing::{Facing, Judged, PlaceKind};
-use super::figures::{Limits, Measurement};
+use super::figures::{Limits, Measurement, RidgePlace};
 pub use figures::CoverageFigures;
 use motion::{Cutters, Toolpath};
 use near::{Near, cube};
@@ -88,6 +88,18 @@ pub struct AlongTask<'a> {
     pub finest: f64,
     /// How often the distance of places that suits the cells is halved.
     pub halvings: i32,
+}
+
+/// What stands on judged surface that no cell measures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnseenSurface {
+    /// The figures.
+    pub measurement: Measurement,
+    /// Distance of the places, mm.
+    pub spacing: f64,
+    /// The places over which more stands than the scallop tolerance, with how much at least, and whether an
+    /// upright tool comes to them.
+    pub above: Vec<(RidgePlace, bool)>,
 }
 
 /// The surface of a part by what is judged and what measures it.
@@ -178,8 +190,7 @@ impl<'a> Coverage<'a> {
         .summed()
     }
 
-    /// Measures what is judged and no cell measures; `None` where there is no such surface. Also the distance
-    /// of the places, mm.
+    /// Measures what is judged and no cell measures; `None` where there is no such surface.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -187,7 +198,7 @@ impl<'a> Coverage<'a> {
         &self,
         task: &AlongTask<'_>,
         monitor: &dyn Monitor,
-    ) -> Result<Option<(Measurement, f64)>, Cancelled> {
+    ) -> Result<Option<UnseenSurface>, Cancelled> {
         let area = self.area(|kind, by| self.facing.is_judged(self.judged, kind) && by == By::Normals);
         if area == 0.0 {
             return Ok(None);
@@ -215,8 +226,17 @@ impl<'a> Coverage<'a> {
         let all = vec![true; net.places.len()];
         let contacts =
             |places: &[NetPlace]| thinned(places, self.are_unseen(places), CONTACT_SHARE * spacing);
-        let (measured, _) = along.measure(net, &all, &contacts, &comes_near, monitor)?;
-        Ok(Some((measured, spacing)))
+        let (measurement, map) = along.measure(net, &all, &contacts, &comes_near, monitor)?;
+        let stands = |k: usize| {
+            let deviation = f64::from(map.deviations[k]);
+            if deviation.is_nan() { cut.standing(&map.points[k], &map.normals[k]) } else { deviation }
+        };
+        let high: Vec<(usize, f64)> = (0..map.points.len()).map(|k| (k, stands(k))).collect();
+        let high: Vec<_> = high.into_iter().filter(|(_, height)| *height > task.limits.scallop).collect();
+        let is_met = self.facing.meets(high.len(), |k| (map.points[high[k].0], map.normals[high[k].0]));
+        let place = |&(k, height): &(usize, f64)| RidgePlace { at: map.points[k], height };
+        let above = high.iter().map(place).zip(is_met).collect();
+        Ok(Some(UnseenSurface { measurement, spacing, above }))
     }
 
     /// Which places are judged and not measured by cells.

@@ -215,7 +215,9 @@ fn unseen_of(
         block: block(part, margin),
     };
     let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1, halvings };
-    coverage.measure_unseen(&task, &Silent).unwrap().unwrap()
+    let UnseenSurface { measurement, spacing, .. } =
+        coverage.measure_unseen(&task, &Silent).unwrap().unwrap();
+    (measurement, spacing)
 }
 
 /// A ball cuts 0.02 mm too deep into a wall: by places half as far apart the area of that is known better.

@@ -1,15 +1,19 @@
 //! The bound against brute force: every move at many places.
 
+use super::cells_above;
 use super::patch::least_greatest;
-use crate::{Asked, Bounded, ExcessFigures, ExcessKind, Limits, Measurement, measure};
+use crate::{
+    Asked, Bounded, Budget, EngineChoice, ExcessFigures, ExcessKind, Judged, Limits, Measurement, Simulation,
+    Task, measure,
+};
 use cutter::Cutter;
 use geometry::{
-    AnalyticShape, AnalyticSurface, NurbsSurface, Point2, Point3, TriangleMesh, Vector2, Vector3,
+    Aabb, AnalyticShape, AnalyticSurface, NurbsSurface, Point2, Point3, TriangleMesh, Vector2, Vector3,
 };
-use motion::{ClPoint, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Cutters, Move, MoveKind, Toolpath};
 use part::{Part, Patch};
 use proptest::prelude::*;
-use sim::{Envelope, Grid, ZMap, cut_reference};
+use sim::{Envelope, Grid, Stock, ZMap, cut_reference};
 use work::monitor::Silent;
 
 const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
@@ -204,6 +208,57 @@ fn holds(
     let all = found.reached.at_most().max(found.unreached.at_most());
     prop_assert!(all >= truth - 1e-9, "{truth} {found:?}");
     Ok(())
+}
+
+/// Every cell over which brute force finds more than a height is told, and next to none over which it does not.
+#[test]
+fn cells_that_hold_more_than_a_height_are_told() {
+    let cases = [(1, Cutter::ball(6.0)), (4, Cutter::ball(6.0)), (5, Cutter::bull(6.0, 1.0))];
+    for (shape, cutter) in cases {
+        let (part, cutters) = (part(shape), Cutters::from(&cutter.unwrap()));
+        let path = path(&part, cutters.first(), 0.7, 0.5, 0.0);
+        let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
+        let block = Aabb { max: part.bounds().max + Vector3::z() * TOP, ..part.bounds() };
+        let cut = cut_reference(&ZMap::block(grid, block.max.z), cutters.first(), &path, &Silent).unwrap();
+        let simulation = Simulation {
+            cell: grid.cell,
+            cell_is_auto: false,
+            memory_mib: 64,
+            engine: EngineChoice::default(),
+            removal: false,
+            error_bound: 5e-4,
+            voxel: None,
+        };
+        let task = Task {
+            part: &part,
+            cutters: &cutters,
+            holder: None,
+            path: &path,
+            stock: &Stock::Box(block),
+            cells: &(grid, None),
+            limits: &LIMITS,
+            simulation: &simulation,
+            pocket: false,
+            budget: Budget::new(&part, 64),
+            judged: Judged::Facing,
+            is_first_look: false,
+        };
+        let brute = Brute::new(&part, cutters.first(), &path);
+        let over = |k: usize| {
+            let (centre, share) = (grid.centre(k % grid.nx, k / grid.nx), |i: i32| f64::from(i - 4) / 8.02);
+            let places = (0..81).map(|i| centre + Vector2::new(share(i % 9), share(i / 9)) * grid.cell);
+            places.filter_map(|q| brute.at(q.x, q.y)).fold(0.0, f64::max)
+        };
+        let truth = work::parallel::map(grid.len(), over);
+        for height in [0.004, 0.008, 0.0098] {
+            let told = cells_above(&task, &cut, height, &Silent).unwrap();
+            let missed = (0..told.len()).filter(|k| !told[*k] && truth[*k] > height + 1e-7).count();
+            let spare = (0..told.len()).filter(|k| told[*k] && truth[*k] < 0.98 * height).count();
+            let all = truth.iter().filter(|found| **found > height).count();
+            assert_eq!(missed, 0, "{shape} {height}: {all} in all, {spare} spare");
+            assert!(spare <= told.len() / 100, "{shape} {height}: {spare} of {} beside {all}", told.len());
+        }
+    }
 }
 
 /// Ridges that come near the limit everywhere are told from it though few squares can be held: what may stand

@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
-use geometry::{Point2, Region};
+use geometry::{Point2, Point3, Region};
+
+/// What stands between cells within this share of an interval beside a higher cell is cut with it: passes come
+/// as near to both as half an interval. Less adds passes at the rim of what is left, more leaves the rim.
+const SERVED: f64 = 0.25;
 
 /// Where passes are to be: everywhere, unless one of these says otherwise.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,6 +24,10 @@ pub struct Rest {
     cell: f64,
     count: [usize; 2],
     stands: Vec<bool>,
+    /// The cells over which too much may stand between the centres; none where nobody asked.
+    between: Vec<bool>,
+    /// The highest place, and its height, mm, to which no upright tool comes.
+    out_of_reach: Option<(Point3, f64)>,
 }
 
 impl Rest {
@@ -30,7 +38,7 @@ impl Rest {
     /// When there are more or fewer cells than that.
     pub fn new(origin: Point2, cell: f64, count: [usize; 2], stands: Vec<bool>) -> Self {
         assert_eq!(stands.len(), count[0] * count[1], "one value for each cell");
-        Self { origin, cell, count, stands }
+        Self { origin, cell, count, stands, between: Vec::new(), out_of_reach: None }
     }
 
     /// With the cells of further places.
@@ -44,14 +52,50 @@ impl Rest {
         self
     }
 
-    /// Whether anything is left at all.
+    /// With the cells over which too much may stand between the centres.
+    ///
+    /// # Panics
+    /// When there are more or fewer of them.
+    #[must_use]
+    pub fn and_between(self, between: Vec<bool>) -> Self {
+        assert_eq!(between.len(), self.stands.len(), "one value for each cell");
+        Self { between, ..self }
+    }
+
+    /// With a place that stands so high, mm, and to which no upright tool comes.
+    #[must_use]
+    pub fn and_out_of_reach(self, highest: Option<(Point3, f64)>) -> Self {
+        Self { out_of_reach: highest, ..self }
+    }
+
+    /// What the user is told of it.
+    pub(crate) fn note(&self) -> Option<String> {
+        let left = self.out_of_reach.map(|(at, height)| {
+            format!(
+                "{:.0} µm at x {:.3} y {:.3} z {:.3}, on a face that looks down or lies below others",
+                1e3 * height,
+                at.x,
+                at.y,
+                at.z
+            )
+        });
+        let nothing = "the toolpaths before left nothing above the scallop tolerance";
+        match (self.is_empty(), left) {
+            (true, None) => Some(nothing.to_owned()),
+            (true, Some(left)) => Some(format!("{nothing} that an upright tool comes to; they left {left}")),
+            (false, left) => left.map(|left| format!("an upright tool does not come to {left}")),
+        }
+    }
+
+    /// Whether nothing is left that an upright tool comes to.
     pub fn is_empty(&self) -> bool {
-        !self.stands.contains(&true)
+        !self.stands.contains(&true) && !self.between.contains(&true)
     }
 
     /// Whether too much stands in the cell of a place.
     pub fn stands(&self, p: &Point2) -> bool {
-        self.cell_of(p).is_some_and(|k| self.stands[k])
+        let between = |k: usize| self.between.get(k).is_some_and(|between| *between);
+        self.cell_of(p).is_some_and(|k| self.stands[k] || between(k))
     }
 
     fn cell_of(&self, p: &Point2) -> Option<usize> {
@@ -61,14 +105,23 @@ impl Rest {
         is_on.then(|| j as usize * nx + i as usize)
     }
 
-    /// With the squares of `reach`, mm, around each place.
+    /// With the squares of `reach`, mm, around each place. What stands between the centres of cells beside
+    /// higher ones lies within their squares, and adds none.
     #[must_use]
     pub fn grown(&self, reach: f64) -> Self {
-        let cells = (reach / self.cell).ceil() as usize;
+        let served = self.spread(&self.stands, (SERVED * reach / self.cell) as usize);
+        let between = self.between.iter().zip(served).map(|(between, served)| *between && !served);
+        let mut all = self.stands.clone();
+        all.iter_mut().zip(between).for_each(|(stands, between)| *stands |= between);
+        let stands = self.spread(&all, (reach / self.cell).ceil() as usize);
+        Self { stands, between: Vec::new(), ..self.clone() }
+    }
+
+    /// As many cells around each that is set.
+    fn spread(&self, set: &[bool], cells: usize) -> Vec<bool> {
         let [nx, ny] = self.count;
-        let along_x = spread(&self.stands, [nx, ny], [1, nx], cells);
-        let stands = spread(&along_x, [ny, nx], [nx, 1], cells);
-        Self { stands, ..self.clone() }
+        let along_x = spread(set, [nx, ny], [1, nx], cells);
+        spread(&along_x, [ny, nx], [nx, 1], cells)
     }
 }
 
@@ -111,6 +164,19 @@ mod tests {
             }
         }
         assert!(!grown.stands(&Point2::new(9.0, 20.0)) && !grown.stands(&Point2::new(14.4, 20.0)));
+        // Beside a higher cell what stands between centres adds nothing, and farther off as much as that.
+        for (i, adds) in [(3, false), (4, true)] {
+            let mut between = vec![false; nx * ny];
+            between[3 * nx + i] = true;
+            let with = rest.clone().and_between(between).grown(2.0);
+            let alone = rest.grown(2.0);
+            assert_eq!(with.stands != alone.stands, adds, "{i}");
+        }
+        let none = Rest::new(Point2::origin(), 1.0, [1, 1], vec![false]);
+        assert_eq!(none.note().unwrap(), "the toolpaths before left nothing above the scallop tolerance");
+        assert!(!none.clone().and_between(vec![true]).is_empty() && rest.note().is_none());
+        let below = none.and_out_of_reach(Some((Point3::new(1.0, 2.0, -3.0), 0.25)));
+        assert!(below.is_empty() && below.note().unwrap().contains("250 µm at x 1.000 y 2.000 z -3.000"));
         let more = rest.clone().and([Point2::new(10.0, 20.0), Point2::new(0.0, 0.0)].into_iter());
         assert!(more.stands(&Point2::new(10.2, 20.2)) && !rest.stands(&Point2::new(10.2, 20.2)));
         assert!(!rest.is_empty() && Rest::new(Point2::origin(), 1.0, [1, 1], vec![false]).is_empty());
