@@ -24,6 +24,10 @@ const STARTS: usize = 6;
 /// levels give.
 const MOST_PLANNED: usize = 3;
 
+/// Two starts led to the same minimum where the levels of both are no farther apart than this, in passes (root
+/// mean square).
+const SAME_LEVELS: f64 = 0.1;
+
 /// Intervals are judged by the gradients at vertices, as passes see them; those of triangles count by this
 /// share, for the unevenness that vertices do not see.
 const DAMPING: f64 = 0.2;
@@ -98,10 +102,9 @@ pub(crate) fn shortest_streams(
     let density = kept.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
     let roughness = roughness(surface, cutter, density);
     let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
-    monitor.start("searching directions", (STARTS + usize::from(further.is_some()) + most) as u64);
     let Some(minimiser) = Minimiser::new(&kept, &gradients, &roughness) else { return Ok(Vec::new()) };
-    let minimise = |start: Vec<f64>, rounds: Rounds| {
-        let found = minimiser.run(prices.end, start, rounds, monitor);
+    let minimise = |start: &[f64], rounds: Rounds| {
+        let found = minimiser.run(prices.end, start.to_vec(), rounds, monitor);
         monitor.advance(1);
         found
     };
@@ -110,17 +113,39 @@ pub(crate) fn shortest_streams(
         mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect()
     };
     let starts: Vec<Vec<f64>> = (0..STARTS).map(straight).chain(further).collect();
-    let starts = parallel::try_map(starts.len(), |k| minimise(starts[k].clone(), Rounds::First))?;
-    let mut starts: Vec<Packed> = starts.into_iter().flatten().collect();
-    starts.sort_by(|a, b| a.priced(prices.end).total_cmp(&b.priced(prices.end)));
-    starts.truncate(most);
-    let found = parallel::try_map(starts.len(), |k| minimise(starts[k].coefficients.clone(), Rounds::Last))?;
+    monitor.start("searching directions", (starts.len() + most) as u64);
+    let found = parallel::try_map(starts.len(), |k| minimise(&starts[k], Rounds::First))?;
+    let mut found: Vec<Packed> = found.into_iter().flatten().collect();
+    found.sort_by(|a, b| a.priced(prices.end).total_cmp(&b.priced(prices.end)));
+    let starts = different(found.into_iter().map(|packed| packed.coefficients), most);
+    let found = parallel::try_map(starts.len(), |k| minimise(&starts[k], Rounds::Last))?;
     let mut found: Vec<Packed> = found.into_iter().flatten().collect();
     keep_promising(&mut found, prices.end, |found| found, |_, _| true);
     for packed in &mut found {
         packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
     }
     Ok(found)
+}
+
+/// The first of some functions whose levels are not those of one before, at most so many.
+fn different(functions: impl Iterator<Item = Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
+    let mut kept: Vec<Vec<f64>> = Vec::new();
+    for function in functions {
+        if kept.len() < most && !kept.iter().any(|other| have_same_levels(other, &function)) {
+            kept.push(function);
+        }
+    }
+    kept
+}
+
+/// Whether two functions differ by a constant alone, within [`SAME_LEVELS`], whichever way they rise.
+fn have_same_levels(a: &[f64], b: &[f64]) -> bool {
+    let count = a.len() as f64;
+    [1.0, -1.0].into_iter().any(|sense| {
+        let apart = || a.iter().zip(b).map(|(a, b)| a - sense * b);
+        let mean = apart().sum::<f64>() / count;
+        apart().map(|d| (d - mean).powi(2)).sum::<f64>() <= count * SAME_LEVELS * SAME_LEVELS
+    })
 }
 
 /// The sides of the part's own triangles along its borders: triangle and side.
@@ -214,5 +239,22 @@ impl Pricing<'_> {
         (0..3).for_each(|k| cost[k] += turning[k]);
         let leaving = self.toward.map_or(0.0, |toward| Site::mean_of_leaving(toward[vertex].1));
         Some((Site { area, stiff_area: 0.0, front, cost, turning, leaving, border: None }, [e1, e2]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_that_led_to_the_same_levels_are_gone_on_with_once() {
+        let along =
+            |x: f64, y: f64| (0..400).map(|k| x * f64::from(k % 20) + y * f64::from(k / 20)).collect();
+        let first: Vec<f64> = along(0.5, 0.0);
+        let turned: Vec<f64> = first.iter().map(|psi| 7.0 - psi + 0.02 * (97.0 * psi).sin()).collect();
+        let square: Vec<f64> = along(0.0, 0.5);
+        let found = [first.clone(), turned, square.clone(), along(0.3, 0.3)];
+        assert_eq!(different(found.clone().into_iter(), 2), [first.clone(), square.clone()]);
+        assert_eq!(different(found.into_iter(), 9).len(), 3);
     }
 }
