@@ -1,9 +1,9 @@
 //! OpenEXR files of maps over a grid, full precision.
 //!
 //! Channels: `Z` height, mm, and `deviation`, mm (NaN off the part), 32-bit float; `move` the index of the
-//! move of the toolpath that cut a cell last, 32-bit whole number, 4294967295 where none of its moves did. Row 0 of the picture holds the
-//! greatest y, as pictures are looked at. One text attribute, `millstream`, holds JSON: `cell_mm`,
-//! `origin_mm` (centre of the cell at the lower left), `unit`.
+//! move of the toolpath that cut a cell last, 32-bit whole number, 4294967295 where none of its moves did.
+//! Row 0 of the picture holds the greatest y, as pictures are looked at. One text attribute, `millstream`,
+//! holds JSON: `cell_mm`, `origin_mm` (centre of the cell at the lower left), `unit`.
 //!
 //! Lines are compressed on the calling thread, because the crate's own threads ignore the thread number that
 //! the user asks for.
@@ -24,8 +24,8 @@ use sim::{Grid, NOT_CUT, ZMap};
 const ENCODING: Encoding =
     Encoding { compression: Compression::ZIP1, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
 
-/// The bytes of an EXR file. `deviation` is over the grid of `cut`, whose moves before the `first` are those of
-/// other toolpaths.
+/// The bytes of an EXR file. `deviation` is over the grid of `cut`, whose moves before the `first` are those
+/// of other toolpaths.
 ///
 /// # Errors
 /// What the encoder says; [`io::ErrorKind::InvalidInput`] when the maps differ in size.
