@@ -496,29 +496,34 @@ impl Problem<'_> {
         let mut slope = vec![0.0; n];
         let mut looks = vec![Look::default(); self.sites.len()];
         let mut value = self.charge(x, penalty, &mut slope, &mut looks);
-        // Steps and changes of the slope.
-        let mut memory: std::collections::VecDeque<[Vec<f64>; 2]> = std::collections::VecDeque::new();
+        // The slope as the preconditioner sees it: all that is solved for follows from these.
+        let preconditioned = |slope: &[f64], scratch: &mut Scratch| {
+            let mut seen = slope.to_vec();
+            factor.solve(scratch, &mut seen[1..]);
+            seen[0] = 0.0;
+            seen
+        };
+        let mut seen = preconditioned(&slope, scratch);
+        // Steps, changes of the slope, and these as the preconditioner sees them.
+        let mut memory: std::collections::VecDeque<[Vec<f64>; 3]> = std::collections::VecDeque::new();
         let mut settled = 0;
         for _ in 0..MOST_STEPS {
             monitor::check(monitor)?;
-            let mut direction: Vec<f64> = slope.iter().map(|g| -g).collect();
+            let mut ahead: Vec<f64> = slope.iter().map(|g| -g).collect();
+            let mut direction: Vec<f64> = seen.iter().map(|g| -g).collect();
             let mut shares = Vec::with_capacity(memory.len());
-            for [step, change] in memory.iter().rev() {
-                let share = dot(step, &direction) / dot(step, change);
-                add(&mut direction, change, -share);
+            for [step, change, seen] in memory.iter().rev() {
+                let share = dot(step, &ahead) / dot(step, change);
+                add(&mut ahead, change, -share);
+                add(&mut direction, seen, -share);
                 shares.push(share);
             }
-            factor.solve(scratch, &mut direction[1..]);
-            direction[0] = 0.0;
-            if let Some([step, change]) = memory.back() {
+            if let Some([step, change, seen]) = memory.back() {
                 // The length of the last step along its change, as the preconditioner sees it.
-                let mut seen = change.clone();
-                factor.solve(scratch, &mut seen[1..]);
-                seen[0] = 0.0;
-                let scale = dot(step, change) / dot(change, &seen);
+                let scale = dot(step, change) / dot(change, seen);
                 direction.iter_mut().for_each(|d| *d *= scale);
             }
-            for ([step, change], share) in memory.iter().zip(shares.iter().rev()) {
+            for ([step, change, _], share) in memory.iter().zip(shares.iter().rev()) {
                 let back = dot(change, &direction) / dot(step, change);
                 add(&mut direction, step, share - back);
             }
@@ -546,14 +551,16 @@ impl Problem<'_> {
             let Some((to, there)) = found else { return Ok(()) };
             let step: Vec<f64> = to.iter().zip(&*x).map(|(a, b)| a - b).collect();
             let change: Vec<f64> = by.iter().zip(&slope).map(|(a, b)| a - b).collect();
+            let now = preconditioned(&by, scratch);
             if dot(&step, &change) > 1e-12 * dot(&step, &step).sqrt() * dot(&change, &change).sqrt() {
-                memory.push_back([step, change]);
+                let seen = now.iter().zip(&seen).map(|(a, b)| a - b).collect();
+                memory.push_back([step, change, seen]);
                 if memory.len() > MEMORY {
                     memory.pop_front();
                 }
             }
             settled = if value - there <= SETTLED * value { settled + 1 } else { 0 };
-            (*x, slope, value) = (to, by, there);
+            (*x, slope, seen, value) = (to, by, now, there);
             if settled == SETTLED_STEPS {
                 return Ok(());
             }
