@@ -191,12 +191,14 @@ fn what_a_nightly_cannot_use_is_refused_before_it_runs() {
     std::fs::write(home.join("rules.toml"), "[[check]]\nscene = \"b\"\nengine = \"rays\"\n").unwrap();
     std::fs::write(home.join("text"), "mine\n").unwrap();
     std::fs::write(home.join("half.toml"), "[[published]]\nsource = \"Author\"\n").unwrap();
+    std::fs::create_dir(home.join("others")).unwrap();
+    std::fs::write(home.join("others/a.toml"), PLATE).unwrap();
     let cases: [(&[&str], &str); 6] = [
         (&["--published", "half.toml"], "`what`"),
         (&["--rules", "rules.toml"], "no scene has that name"),
         (&["--baseline", "none.json"], "cannot read none.json"),
         (&["--baseline", "text"], "no nightly.json"),
-        (&["scenes"], "both named a"),
+        (&["others"], "both named a"),
         (&["--merge"], "cannot read scenes/nightly.json"),
     ];
     for (arguments, words) in cases {
