@@ -1,6 +1,7 @@
 //! The surface that a measurement covers, and the share of it that no cell sees, measured along its normals.
 
 use cutter::Solid;
+use geometry::Vector3;
 use metrology::{
     AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measured, Measurement,
     REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, RidgePlace, SweptVolume, UnseenSurface, View,
@@ -39,9 +40,9 @@ pub(crate) struct Unseen {
     pub spacing_mm: f64,
     /// Whether a place was never cut: material then stands at least as high as is looked.
     pub never_cut: bool,
-    /// The places over which more stands than the scallop tolerance, with how much at least, and whether an
-    /// upright tool comes to them.
-    pub above: Vec<(RidgePlace, bool)>,
+    /// The places over which more stands than the scallop tolerance, with how much at least, and their outward
+    /// unit normals.
+    pub above: Vec<(RidgePlace, Vector3)>,
 }
 
 impl Session {

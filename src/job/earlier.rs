@@ -79,10 +79,15 @@ pub(crate) fn left_over(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Rest, Jo
     let highest = highest.at_mm.map(|at| RidgePlace { at: at.into(), height: highest.max_mm });
     let places = found.above.iter().filter(|place| place.height > limit);
     let places: Vec<RidgePlace> = places.chain(highest.iter().filter(|_| may_be_higher)).copied().collect();
-    let feet = work::parallel::map(places.len(), |k| run.part().closest_point(&places[k].at).0);
-    let is_met = task.facing().meets(feet.len(), |k| (feet[k].point, feet[k].normal));
-    let all = unseen.above.iter().copied().chain(places.into_iter().zip(is_met));
-    let (open, closed): (Vec<_>, Vec<_>) = all.partition(|(_, is_met)| *is_met);
+    let foot = |k: usize| {
+        let foot = run.part().closest_point(&places[k].at).0;
+        (places[k], foot.point, foot.normal)
+    };
+    let mut all: Vec<_> = unseen.above.iter().map(|(place, normal)| (*place, place.at, *normal)).collect();
+    all.extend(work::parallel::map(places.len(), foot));
+    let is_met = task.facing().meets(all.len(), |k| (all[k].1, all[k].2));
+    let (open, closed): (Vec<_>, Vec<_>) =
+        all.into_iter().map(|(place, ..)| place).zip(is_met).partition(|(_, is_met)| *is_met);
     let closed = closed.into_iter().map(|(place, _)| (place.at, place.height));
     let highest = closed.filter(|(_, height)| *height > limit).max_by(|a, b| a.1.total_cmp(&b.1));
     Ok(rest.and(open.into_iter().map(|(place, _)| place.at.xy())).and_out_of_reach(highest))

@@ -125,7 +125,7 @@ pub(super) fn places_above(
 }
 
 /// An inspection that searches nothing between the centres of cells.
-fn on_cells<'a>(
+pub(super) fn on_cells<'a>(
     part: &'a Part,
     cutters: &'a Cutters,
     limits: &'a Limits,

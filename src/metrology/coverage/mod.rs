@@ -20,7 +20,7 @@ mod unseen_cut;
 
 use std::collections::{HashMap, HashSet};
 
-use geometry::{Point2, Point3};
+use geometry::{Point2, Point3, Vector3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
 
@@ -97,9 +97,9 @@ pub struct UnseenSurface {
     pub measurement: Measurement,
     /// Distance of the places, mm.
     pub spacing: f64,
-    /// The places over which more stands than the scallop tolerance, with how much at least, and whether an
-    /// upright tool comes to them.
-    pub above: Vec<(RidgePlace, bool)>,
+    /// The places over which more stands than the scallop tolerance, with how much at least, and their outward
+    /// unit normals.
+    pub above: Vec<(RidgePlace, Vector3)>,
 }
 
 /// The surface of a part by what is judged and what measures it.
@@ -231,11 +231,9 @@ impl<'a> Coverage<'a> {
             let deviation = f64::from(map.deviations[k]);
             if deviation.is_nan() { cut.standing(&map.points[k], &map.normals[k]) } else { deviation }
         };
-        let high: Vec<(usize, f64)> = (0..map.points.len()).map(|k| (k, stands(k))).collect();
-        let high: Vec<_> = high.into_iter().filter(|(_, height)| *height > task.limits.scallop).collect();
-        let is_met = self.facing.meets(high.len(), |k| (map.points[high[k].0], map.normals[high[k].0]));
-        let place = |&(k, height): &(usize, f64)| RidgePlace { at: map.points[k], height };
-        let above = high.iter().map(place).zip(is_met).collect();
+        let place = |k: usize| (RidgePlace { at: map.points[k], height: stands(k) }, map.normals[k]);
+        let above = (0..map.points.len()).map(place);
+        let above = above.filter(|(place, _)| place.height > task.limits.scallop).collect();
         Ok(Some(UnseenSurface { measurement, spacing, above }))
     }
 

@@ -9,13 +9,13 @@ use std::sync::atomic::Ordering;
 use super::patch::Held;
 use super::{ExcessSearch, beside_part};
 use crate::closer::Square;
-use crate::coverage::STEEP;
 use crate::cut_surface::CutSurface;
 use crate::engines::Task;
 use crate::every_move::EveryMove;
 use crate::inspection::{Inspection, Sample};
 use crate::measure::{up_to, walls_of};
 use crate::meetings::Meetings;
+use crate::ridge_map::on_cells;
 use sim::{CutError, Envelope, ZMap};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -43,21 +43,11 @@ pub fn cells_above(
     let facing = facing.as_ref();
     let asked = task.simulation.error_bound;
     let walls = walls_of(part, cutters, path, (&surface, limits, asked), facing, monitor)?;
+    let meetings = Meetings::new(&surface, cutters, path, None);
     let inspection = Inspection {
-        part,
-        cutters,
-        limits,
-        asked,
-        most_squares: 0,
-        is_first_look: false,
-        surface: &surface,
-        meetings: &Meetings::new(&surface, cutters, path, None),
-        grid: cut.grid,
-        steepest: STEEP,
-        creases: None,
-        borders: None,
         walls: walls.as_ref(),
         every_move: Some(&EveryMove::new(&surface, cutters, &up_to(part, stock_top))),
+        ..on_cells(part, cutters, limits, asked, &surface, &meetings)
     };
     let samples = inspection.samples(monitor)?;
     let search = ExcessSearch { inspection: &inspection, stock_top };
