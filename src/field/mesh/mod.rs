@@ -3,6 +3,7 @@
 //! Enters: a mesh, directions at its vertices and the density of passes wanted there. Leaves: smooth
 //! line fields with their singular points and streamlines, stream functions, and their level curves.
 
+mod coarser;
 mod levels;
 mod lines;
 mod recover;
@@ -16,6 +17,7 @@ mod tests;
 mod trace;
 mod weld;
 
+pub use coarser::Coarser;
 pub use levels::{MeshCurve, MeshLevels, MeshPoint};
 pub use lines::{
     Line, SingularPoint, Wanted, blend, blend_lines, flows, merge_singular_points, orient_lines,

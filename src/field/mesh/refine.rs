@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 
 use super::{Bend, MeshFieldError, Sheets};
+use foldhash::fast::FixedState;
 use geometry::{Point3, Vector3};
 
 /// Greatest number of triangles of a refined mesh: what a machine of 8 GB factorises in seconds.
@@ -22,6 +23,9 @@ const FLIP_ROUNDS: usize = 4;
 /// Opposite angles must pass half a turn by this much, as a sine, before a diagonal is exchanged: else
 /// rounding would exchange those of a square back and forth.
 const FLIP_GAIN: f64 = 1e-6;
+
+/// What is known of edges, by their ends.
+type Edges<T> = HashMap<(u32, u32), T, FixedState>;
 
 /// A mesh in the making.
 #[derive(Debug, Clone)]
@@ -121,8 +125,7 @@ impl Refined {
 
     /// One round: every edge that is too long is split. False when there was none.
     fn split(&mut self, length: f64) -> Result<bool, MeshFieldError> {
-        let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
-        let mut wedge_middles: HashMap<(u32, u32), u32> = HashMap::new();
+        let (mut middles, mut wedge_middles) = (Edges::<u32>::default(), Edges::<u32>::default());
         let limit = length * length * (1.0 + 1e-9);
         let (triangles, wedges) =
             (std::mem::take(&mut self.triangles), std::mem::take(&mut self.sheets.corners));
@@ -206,8 +209,8 @@ impl Refined {
     /// Exchanges diagonals of flat pairs of triangles that a Delaunay triangulation would not have.
     fn flip(&mut self) {
         for _ in 0..FLIP_ROUNDS {
-            let mut sides: HashMap<(u32, u32), (usize, usize)> =
-                HashMap::with_capacity(3 * self.triangles.len());
+            let mut sides: Edges<(usize, usize)> =
+                Edges::with_capacity_and_hasher(3 * self.triangles.len(), FixedState::default());
             for (t, corners) in self.triangles.iter().enumerate() {
                 for k in 0..3 {
                     sides.insert((corners[k], corners[(k + 1) % 3]), (t, k));

@@ -142,10 +142,14 @@ fn on_piece(
             let lines = lines.transpose()?;
             let quickest = toward.is_none() && objective == Objective::Time;
             let around = quickest.then(|| along_borders(task, piece, surface)).flatten();
-            let mut found = shortest_streams(surface, task, lines.as_deref(), around.clone(), objective)?;
+            let coarser = surface.coarser(piece, task.cutter);
+            let search = |further, objective| {
+                shortest_streams(surface, coarser.as_ref(), task, lines.as_deref(), further, objective)
+            };
+            let mut found = search(around.clone(), objective)?;
             if quickest {
                 // What the least length promises may still take less time.
-                found.extend(shortest_streams(surface, task, None, None, Objective::Length)?);
+                found.extend(search(None, Objective::Length)?);
             }
             let levelled = |found: Packed| {
                 let length = found.cost - found.turning + found.ends;

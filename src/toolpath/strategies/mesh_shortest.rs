@@ -11,10 +11,10 @@ use super::stream_search::{Prices, keep_promising, turning};
 use crate::surface::mesh_surface::MeshSurface;
 use crate::vocabulary::{Guide, Step, Task};
 use cutter::Cutter;
-use field::mesh::{Bend, gradient_terms};
+use field::mesh::{Bend, Coarser, gradient_terms};
 use field::{Front, Gradients, Minimiser, Packed, Roughness, Rounds, Site};
 use geometry::Vector3;
-use work::monitor::Cancelled;
+use work::monitor::{Cancelled, Monitor};
 use work::parallel;
 
 /// Straight passes to start from, over half a turn.
@@ -42,89 +42,160 @@ const STRIP_SHARE: f64 = 0.02;
 
 /// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least
 /// time, the most promising first. `toward` has at each vertex a direction and how much dearer passes square
-/// to it are; `further` is a start besides straight passes.
+/// to it are; `further` is a start besides straight passes. Starts are gone on with on the `coarser` surface.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 pub(crate) fn shortest_streams(
     surface: &MeshSurface,
+    coarser: Option<&(MeshSurface, Coarser)>,
     task: &Task<'_>,
     toward: Option<&[(Vector3, f64)]>,
     further: Option<Vec<f64>>,
     objective: Objective,
 ) -> Result<Vec<Packed>, Cancelled> {
-    let Task { cutter, ref settings, ref pace, monitor, .. } = *task;
-    let slowed = |curvature: f64| pace.slowed(curvature, cutter.corner_radius());
+    let monitor = task.monitor;
+    let slowed = |curvature: f64| task.pace.slowed(curvature, task.cutter.corner_radius());
     let prices = match (objective, toward) {
-        (Objective::Time, None) => Prices { end: 0.5 * pace.link, turning: &slowed },
+        (Objective::Time, None) => Prices { end: 0.5 * task.pace.link, turning: &slowed },
         _ => Prices { end: 0.0, turning: &|_| 0.0 },
     };
-    let mesh = &surface.mesh;
-    let (own, count) = (surface.own_triangles, mesh.points().len());
-    let share = |t: usize| if t < own { mesh.area(t) } else { STRIP_SHARE * mesh.area(t) };
-    let mut around = vec![0.0; count];
-    for (t, corners) in mesh.triangles().iter().enumerate() {
-        corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
-    }
-    let pricing = Pricing { surface, cutter, step: settings.step, guide: settings.guide(), toward, prices };
-    let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
-        None => pricing.at_vertex(k, (1.0 - DAMPING) * around[k]),
-        Some(t) => pricing.on_triangle(t, DAMPING * share(t)),
-    });
-    let recovered = gradient_terms(mesh);
-    let mut gradients = Gradients::new(count);
-    let mut kept = Vec::with_capacity(sites.len());
-    for (k, site) in sites.into_iter().enumerate() {
-        let Some((mut site, [e1, e2])) = site else { continue };
-        let flat = |(v, gradient): (u32, Vector3)| (v, [gradient.dot(&e1), gradient.dot(&e2)]);
-        match k.checked_sub(count) {
-            None => gradients.push(&site, recovered[k].iter().copied().map(flat)),
-            Some(t) => {
-                site.stiff_area = share(t);
-                let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
-                gradients.push(&site, hats.map(flat));
-            }
+    monitor.start("searching directions", (STARTS + usize::from(further.is_some())) as u64);
+    let mut found = match coarser {
+        Some((coarse, carry)) => {
+            let own = |v: usize| carry.kept[coarse.origin[v] as usize] as usize;
+            let count = coarse.mesh.points().len();
+            let there = toward.map(|toward| (0..count).map(|v| toward[own(v)]).collect::<Vec<_>>());
+            let further =
+                further.map(|values| coarse.continued((0..count).map(|v| values[own(v)]).collect()));
+            let search = Search::new(coarse, task, there.as_deref(), prices);
+            let found = search.from_starts(coarse, further, monitor)?;
+            let starts = found.into_iter().map(|packed| {
+                let mut values = carry.on_finer(&packed.coefficients[..carry.kept.len()]);
+                values.resize(surface.mesh.points().len(), 0.0);
+                surface.continued(values)
+            });
+            let search = Search::new(surface, task, toward, prices);
+            let Some(minimiser) = search.minimiser() else { return Ok(Vec::new()) };
+            search.minima(&minimiser, starts.collect(), Rounds::Last, monitor)?
         }
-        kept.push(site);
-    }
-    if prices.end > 0.0 {
-        for [t, k] in border_sides(surface) {
-            let Some((mut site, [e1, e2])) = pricing.on_triangle(t, 0.0) else { continue };
-            let corners = mesh.corners(t);
-            let side = corners[(k + 1) % 3] - corners[k];
-            site.border = Some([side.dot(&e1), side.dot(&e2)]);
-            let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
-            gradients.push(&site, hats.map(|(v, gradient)| (v, [gradient.dot(&e1), gradient.dot(&e2)])));
-            kept.push(site);
-        }
-    }
-    let area: f64 = kept.iter().map(|site| site.area).sum();
-    let density = kept.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
-    let roughness = roughness(surface, cutter, density);
-    let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
-    let Some(minimiser) = Minimiser::new(&kept, &gradients, &roughness) else { return Ok(Vec::new()) };
-    let minimise = |start: &[f64], rounds: Rounds| {
-        let found = minimiser.run(prices.end, start.to_vec(), rounds, monitor);
-        monitor.advance(1);
-        found
+        None => Search::new(surface, task, toward, prices).from_starts(surface, further, monitor)?,
     };
-    let straight = |k: usize| -> Vec<f64> {
-        let (sin, cos) = (PI * k as f64 / STARTS as f64).sin_cos();
-        mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect()
-    };
-    let starts: Vec<Vec<f64>> = (0..STARTS).map(straight).chain(further).collect();
-    monitor.start("searching directions", (starts.len() + most) as u64);
-    let found = parallel::try_map(starts.len(), |k| minimise(&starts[k], Rounds::First))?;
-    let mut found: Vec<Packed> = found.into_iter().flatten().collect();
-    found.sort_by(|a, b| a.priced(prices.end).total_cmp(&b.priced(prices.end)));
-    let starts = different(found.into_iter().map(|packed| packed.coefficients), most);
-    let found = parallel::try_map(starts.len(), |k| minimise(&starts[k], Rounds::Last))?;
-    let mut found: Vec<Packed> = found.into_iter().flatten().collect();
-    keep_promising(&mut found, prices.end, |found| found, |_, _| true);
     for packed in &mut found {
         packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
     }
     Ok(found)
+}
+
+/// A surface as the minimiser sees it.
+struct Search {
+    sites: Vec<Site>,
+    gradients: Gradients,
+    roughness: Roughness,
+    /// Passes to a mm across them, in the mean.
+    density: f64,
+    /// Price of an end of a pass, mm.
+    end: f64,
+}
+
+impl Search {
+    fn new(
+        surface: &MeshSurface,
+        task: &Task<'_>,
+        toward: Option<&[(Vector3, f64)]>,
+        prices: Prices<'_>,
+    ) -> Self {
+        let Task { cutter, ref settings, .. } = *task;
+        let mesh = &surface.mesh;
+        let (own, count) = (surface.own_triangles, mesh.points().len());
+        let share = |t: usize| if t < own { mesh.area(t) } else { STRIP_SHARE * mesh.area(t) };
+        let mut around = vec![0.0; count];
+        for (t, corners) in mesh.triangles().iter().enumerate() {
+            corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
+        }
+        let pricing =
+            Pricing { surface, cutter, step: settings.step, guide: settings.guide(), toward, prices };
+        let found = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
+            None => pricing.at_vertex(k, (1.0 - DAMPING) * around[k]),
+            Some(t) => pricing.on_triangle(t, DAMPING * share(t)),
+        });
+        let recovered = gradient_terms(mesh);
+        let mut gradients = Gradients::new(count);
+        let mut sites = Vec::with_capacity(found.len());
+        for (k, site) in found.into_iter().enumerate() {
+            let Some((mut site, [e1, e2])) = site else { continue };
+            let flat = |(v, gradient): (u32, Vector3)| (v, [gradient.dot(&e1), gradient.dot(&e2)]);
+            match k.checked_sub(count) {
+                None => gradients.push(&site, recovered[k].iter().copied().map(flat)),
+                Some(t) => {
+                    site.stiff_area = share(t);
+                    let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
+                    gradients.push(&site, hats.map(flat));
+                }
+            }
+            sites.push(site);
+        }
+        if prices.end > 0.0 {
+            for [t, k] in border_sides(surface) {
+                let Some((mut site, [e1, e2])) = pricing.on_triangle(t, 0.0) else { continue };
+                let corners = mesh.corners(t);
+                let side = corners[(k + 1) % 3] - corners[k];
+                site.border = Some([side.dot(&e1), side.dot(&e2)]);
+                let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
+                gradients.push(&site, hats.map(|(v, gradient)| (v, [gradient.dot(&e1), gradient.dot(&e2)])));
+                sites.push(site);
+            }
+        }
+        let area: f64 = sites.iter().map(|site| site.area).sum();
+        let density = sites.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
+        let roughness = roughness(surface, cutter, density);
+        Self { sites, gradients, roughness, density, end: prices.end }
+    }
+
+    /// To where straight passes and a further start lead: the shortest passes, or the few that promise the least
+    /// time.
+    fn from_starts(
+        &self,
+        surface: &MeshSurface,
+        further: Option<Vec<f64>>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Packed>, Cancelled> {
+        let Some(minimiser) = self.minimiser() else { return Ok(Vec::new()) };
+        let straight = |k: usize| -> Vec<f64> {
+            let (sin, cos) = (PI * k as f64 / STARTS as f64).sin_cos();
+            surface.mesh.points().iter().map(|p| self.density * (cos * p.x + sin * p.y)).collect()
+        };
+        let starts = (0..STARTS).map(straight).chain(further).collect();
+        let found = self.minima(&minimiser, starts, Rounds::First, monitor)?;
+        let most = if self.end > 0.0 { MOST_PLANNED } else { 1 };
+        let promising = different(found.into_iter().map(|packed| packed.coefficients), most);
+        let mut found = self.minima(&minimiser, promising, Rounds::Last, monitor)?;
+        keep_promising(&mut found, self.end, |found| found, |_, _| true);
+        Ok(found)
+    }
+
+    /// `None` where the surface does not determine a function.
+    fn minimiser(&self) -> Option<Minimiser<'_>> {
+        Minimiser::new(&self.sites, &self.gradients, &self.roughness)
+    }
+
+    /// The minima to which functions lead, what promises most first.
+    fn minima(
+        &self,
+        minimiser: &Minimiser<'_>,
+        starts: Vec<Vec<f64>>,
+        rounds: Rounds,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Packed>, Cancelled> {
+        let found = parallel::try_map(starts.len(), |k| {
+            let found = minimiser.run(self.end, starts[k].clone(), rounds, monitor);
+            monitor.advance(1);
+            found
+        })?;
+        let mut found: Vec<Packed> = found.into_iter().flatten().collect();
+        found.sort_by(|a, b| a.priced(self.end).total_cmp(&b.priced(self.end)));
+        Ok(found)
+    }
 }
 
 /// The first of some functions whose levels are not those of one before, at most so many.
@@ -244,7 +315,54 @@ impl Pricing<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::mesh_passes::level_interval;
     use super::*;
+    use crate::surface::mesh_surface::reachable;
+    use crate::vocabulary::{Pace, PassSettings};
+    use geometry::{Point3, TriangleMesh};
+    use part::Part;
+    use work::monitor::Silent;
+
+    /// A surface of hills and hollows as facets.
+    fn hills() -> Part {
+        let (nx, ny) = (36, 30);
+        let at = |k: usize| (k % nx, k / nx);
+        let point = |k: usize| {
+            let (x, y) = (at(k).0 as f64, at(k).1 as f64);
+            Point3::new(x, y, 1.5 * (x / 5.0 + 0.4 * (y / 4.0).sin()).sin() * (y / 6.0).cos())
+        };
+        let cells = (0..nx * (ny - 1)).filter(|&k| at(k).0 + 1 < nx);
+        let corners = |k: usize| [k, k + 1, k + nx + 1, k + nx].map(|k| k as u32);
+        let triangles = cells.flat_map(|k| {
+            let [a, b, c, d] = corners(k);
+            [[a, b, c], [a, c, d]]
+        });
+        Part::from_mesh(TriangleMesh::new((0..nx * ny).map(point).collect(), triangles.collect()).unwrap().0)
+    }
+
+    /// Where starts are compared on few vertices, the minimum is the same as where all of them are asked.
+    #[test]
+    fn starts_compared_on_a_coarser_mesh_lead_to_as_good_a_function() {
+        let (part, cutter) = (hills(), Cutter::ball(6.0).unwrap());
+        let step = Step::Scallop(0.02);
+        let flat = level_interval(&cutter, 0.02);
+        let piece = &reachable(&part, &cutter, flat).unwrap().pieces[0];
+        let surface = MeshSurface::with_margin(piece, flat).unwrap();
+        let coarser = surface.coarser(piece, &cutter).unwrap();
+        assert!(6 * coarser.0.mesh.points().len() < surface.mesh.points().len());
+        let settings = PassSettings::upright(step, 0.5);
+        let pace = Pace { duration: &|passes, _| Ok(passes.length()), link: 2.0, bend: 0.1 };
+        let task = Task { part: &part, cutter: &cutter, settings, wants_mesh: true, pace, monitor: &Silent };
+        for (objective, end) in [(Objective::Length, 0.0), (Objective::Time, 0.5 * pace.link)] {
+            let priced = |coarser| {
+                let found = shortest_streams(&surface, coarser, &task, None, None, objective).unwrap();
+                assert!(found[0].short < 0.01);
+                found[0].priced(end)
+            };
+            let [whole, coarse] = [priced(None), priced(Some(&coarser))];
+            assert!(coarse <= 1.001 * whole, "{coarse} {whole}");
+        }
+    }
 
     #[test]
     fn starts_that_led_to_the_same_levels_are_gone_on_with_once() {

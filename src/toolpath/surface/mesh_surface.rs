@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 
 use crate::vocabulary::PlanError;
 use cutter::Cutter;
-use field::mesh::{Bend, FieldMesh, MeshFieldError, Refined, Sheets, parted, weld};
+use field::mesh::{Bend, Coarser, FieldMesh, MeshFieldError, Refined, Sheets, parted, weld};
 use geometry::{Point3, Vector3};
 use part::Part;
 
@@ -54,6 +54,10 @@ const LEAST_HEIGHT_OVER_DEVIATION: f64 = 10.0;
 /// A strip's outer corner is at most this many widths away from the border's.
 const LONGEST_MITER: f64 = 2.0;
 
+/// A coarser mesh has edges so many times as long: an eighth of the vertices or more, which still show where
+/// curvature changes over the radius of the cutter.
+const COARSER: f64 = 3.0;
+
 /// The surface that fields stand on, with a strip beyond its borders.
 pub(crate) struct MeshSurface {
     /// All triangles, those of the strip last.
@@ -69,6 +73,8 @@ pub(crate) struct MeshSurface {
     pub origin: Vec<u32>,
     /// Direction of the border at each triangle of the strip.
     pub border: Vec<Vector3>,
+    /// Width of the strip, mm.
+    margin: f64,
 }
 
 /// A connected piece of a surface.
@@ -368,7 +374,27 @@ impl MeshSurface {
         let own_triangles = piece.triangles().len();
         let mesh =
             FieldMesh::new(points, triangles, Some(normals)).map_err(|e| not_applicable(&e.to_string()))?;
-        Ok(Self { mesh, bends, corner_normals, own_triangles, origin, border })
+        Ok(Self { mesh, bends, corner_normals, own_triangles, origin, border, margin: width })
+    }
+
+    /// The same surface by fewer vertices, and how functions come from it; `None` where they would be hardly
+    /// fewer.
+    pub fn coarser(&self, piece: &ConnectedPiece, cutter: &Cutter) -> Option<(Self, Coarser)> {
+        let mesh = &piece.mesh;
+        let length = |&[v, w]: &[u32; 2]| (mesh.points()[w as usize] - mesh.points()[v as usize]).norm();
+        let longest = mesh.edges().iter().map(length).fold(EDGE_OVER_RADIUS * cutter.radius(), f64::max);
+        let coarser = Coarser::new(mesh, COARSER * longest).ok()?;
+        if 2 * coarser.kept.len() > mesh.points().len() {
+            return None;
+        }
+        let corner_normals = coarser.mesh.triangles().iter();
+        let corner_normals = corner_normals.map(|t| t.map(|v| coarser.mesh.normals()[v as usize])).collect();
+        let piece = ConnectedPiece {
+            mesh: coarser.mesh.clone(),
+            bends: coarser.of_finer(&piece.bends),
+            corner_normals,
+        };
+        Some((Self::with_margin(&piece, self.margin).ok()?, coarser))
     }
 
     /// A function of the vertices that goes on beyond borders as it comes to them, in the tangent planes.
