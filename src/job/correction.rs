@@ -40,7 +40,7 @@ pub(crate) use looking::Looked;
 use next::{EVENLY_HIGH, are_ends_alone, changes};
 pub(crate) use round::{CorrectionFigures, CorrectionRound};
 use round::{Gain, Goal};
-use standing::{Standing, Wanted, cutting_length, too_near};
+use standing::{Standing, Wanted, cutting_length, digest, too_near};
 use widths::Widths;
 
 /// Most plans that are made while only ridges are measured.
@@ -84,6 +84,14 @@ struct Tried {
     kept: Arc<Kept>,
 }
 
+/// A plan that was made, as far as others by the same widths or with the same path are told by it.
+struct Made {
+    widths: Widths,
+    /// A digest of its moves.
+    path: u64,
+    standing: Standing,
+}
+
 /// The loop over one toolpath.
 struct Corrected<'a> {
     session: &'a Session,
@@ -106,6 +114,8 @@ struct Corrected<'a> {
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
+    /// The plans so far.
+    made: Vec<Made>,
     /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells
     /// show.
     is_complete: bool,
@@ -182,9 +192,11 @@ impl Session {
             narrower: None,
             rounds,
             kept: 0,
+            made: Vec::new(),
             is_complete: false,
             is_hopeless: false,
         };
+        corrected.remember_best();
         let looked = match looked {
             Some(looked) => looked,
             None => {
@@ -216,9 +228,12 @@ impl Corrected<'_> {
             && let Some(next) = self.next(in_vain, slack).filter(|_| !self.ends_in_vain(in_vain))
         {
             let next = if in_vain == 0 { self.completed(next, slack, monitor)? } else { next };
+            if self.was_made(&next, false) {
+                in_vain += 1;
+                continue;
+            }
             let (planned, factors) = self.plan(&next, monitor)?;
-            let gain = if self.is_left_as_before(&planned, factors) {
-                let found = self.as_before(&planned, factors);
+            let gain = if let Some(found) = self.as_before(&planned, factors, false) {
                 self.keep_best(&planned, next, found)
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
@@ -226,7 +241,9 @@ impl Corrected<'_> {
                 let found =
                     map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted(false)));
                 let Some(found) = found else { break };
-                self.keep_if_better(planned, next, found)
+                let gain = found.round.gain_over(&self.tried.standing.round, &self.goal);
+                self.keep_if(gain, planned, next, found);
+                gain
             };
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
@@ -251,9 +268,13 @@ impl Corrected<'_> {
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
-    fn by_measurements(&mut self, looked: Looked, monitor: &dyn Monitor) -> Result<Looked, JobError> {
+    fn by_measurements(&mut self, mut looked: Looked, monitor: &dyn Monitor) -> Result<Looked, JobError> {
         if self.is_unavoidable(&looked.measured.measurement, monitor)? {
+            self.look_at_all_of_best(&mut looked, monitor)?;
             return Ok(looked);
+        }
+        if looked.of_cells_alone && self.next(0, MEASURED_SLACK).is_some() {
+            self.look_at_all_of_best(&mut looked, monitor)?;
         }
         let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
         for round in 0..MOST_MEASURED_NEAR {
@@ -265,47 +286,72 @@ impl Corrected<'_> {
             let narrower = self.narrower.take().filter(|_| round == 0 && fails && !self.is_far_off());
             let next = narrower.or_else(|| self.next(in_vain, MEASURED_SLACK));
             let Some(next) = next.filter(|_| !self.ends_in_vain(in_vain)) else { break };
+            if self.was_made(&next, true) {
+                in_vain += 1;
+                continue;
+            }
             let (planned, factors) = self.plan(&next, monitor)?;
-            if self.is_left_as_before(&planned, factors) {
-                let found = self.as_before(&planned, factors);
+            if let Some(found) = self.as_before(&planned, factors, true) {
                 gain = self.keep_best(&planned, next, found);
             } else {
                 let is_passing = looked.as_ref().is_some_and(|looked| self.session.passes(looked));
                 // Two at a time might be more than the memory that the run may take.
                 drop(looked.take());
-                let path = &planned.plan.path;
-                let again = self.session.look(
-                    self.request,
-                    self.earlier,
-                    self.engine,
-                    path,
-                    self.closeness,
-                    monitor,
-                )?;
-                let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
-                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that
-                // cuts too deep or leaves more uncut.
-                let (limits, best) = (&self.session.scene.tolerance, &self.tried.standing);
-                let is_deeper = found.depth > limits.gouge && best.depth <= limits.gouge;
-                let leaves_more = found.unreached > limits.uncut && best.unreached <= limits.uncut;
-                gain = match (is_passing, self.session.passes(&again)) {
-                    (false, true) => self.keep(planned, next, found),
-                    (true, false) => self.keep_best(&planned, next, found),
-                    _ if is_deeper || leaves_more => self.keep_best(&planned, next, found),
-                    _ => self.keep_if_better(planned, next, found),
-                };
-                if gain != Gain::None {
-                    looked = Some(again);
-                }
+                let (again, found);
+                (again, found, gain) = self.compared(&planned, factors, is_passing, monitor)?;
+                self.keep_if(gain, planned, next, found);
+                looked = (gain != Gain::None).then_some(again);
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
-        match looked {
-            Some(looked) if looked.is_as_verdict => Ok(looked),
+        let mut looked = match looked {
+            Some(looked) if looked.is_as_verdict => looked,
             other => {
                 drop(other);
-                self.look_at_best(Closeness::Verdict, monitor)
+                self.look_at_best(Closeness::Verdict, monitor)?
             }
+        };
+        self.look_at_all_of_best(&mut looked, monitor)?;
+        Ok(looked)
+    }
+
+    /// Measures a plan, and tells what it gains over the best one. While cells fail, what they do not see is
+    /// measured of a plan only that is better but for it: with it no less stands.
+    fn compared(
+        &self,
+        planned: &Planned,
+        factors: [f64; 2],
+        is_passing: bool,
+        monitor: &dyn Monitor,
+    ) -> Result<(Looked, Standing, Gain), JobError> {
+        let (session, path) = (self.session, &planned.plan.path);
+        let mut looked =
+            session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+        let passes = [is_passing, session.passes(&looked)];
+        let standing = |looked: &Looked| Standing::of_all(looked, planned, factors, self.wanted(true));
+        let mut found = standing(&looked);
+        let mut gain = self.gain(&found, passes);
+        if gain != Gain::None && looked.of_cells_alone {
+            session.look_beside_cells(self.request, self.earlier, path, &mut looked, monitor)?;
+            found = standing(&looked);
+            gain = self.gain(&found, passes);
+        }
+        Ok((looked, found, gain))
+    }
+
+    /// What a plan gains over the best one, where `passes` tells of the best one and of this one whether it
+    /// passes. A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that cuts
+    /// too deep or leaves more uncut.
+    fn gain(&self, found: &Standing, passes: [bool; 2]) -> Gain {
+        let (limits, best) = (&self.session.scene.tolerance, &self.tried.standing);
+        let is_deeper = found.depth > limits.gouge && best.depth <= limits.gouge;
+        let leaves_more = found.unreached > limits.uncut && best.unreached <= limits.uncut;
+        match (passes, [best.is_never_cut, found.is_never_cut]) {
+            ([false, true], _) => Gain::Much,
+            ([true, false], _) | (_, [false, true]) => Gain::None,
+            _ if is_deeper || leaves_more => Gain::None,
+            (_, [true, false]) => Gain::Much,
+            _ => found.round.gain_over(&best.round, &self.goal),
         }
     }
 
@@ -376,15 +422,43 @@ impl Corrected<'_> {
         Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
 
-    /// Measures all of the best plan.
+    /// Measures the best plan, where no cell sees as well unless the rest fails for certain.
     fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
         let path = &self.best.plan.path;
         let looked = self.session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
+        self.tell_of_best(&looked);
+        Ok(looked)
+    }
+
+    /// Measures the best plan where no cell sees, unless that was done.
+    fn look_at_all_of_best(&mut self, looked: &mut Looked, monitor: &dyn Monitor) -> Result<(), JobError> {
+        if looked.of_cells_alone {
+            let path = &self.best.plan.path;
+            self.session.look_beside_cells(self.request, self.earlier, path, looked, monitor)?;
+            self.tell_of_best(looked);
+        }
+        Ok(())
+    }
+
+    /// Puts what was measured of the best plan in place of what was known of it.
+    fn tell_of_best(&mut self, looked: &Looked) {
         let factors = self.tried.standing.round.factors;
-        let standing = Standing::of_all(&looked, &self.best, factors, self.wanted(true));
+        let standing = Standing::of_all(looked, &self.best, factors, self.wanted(true));
         self.rounds[self.kept] = standing.round;
         self.tried.standing = standing;
-        Ok(looked)
+        self.remember_best();
+    }
+
+    fn remember_best(&mut self) {
+        let Tried { widths, standing, .. } = &self.tried;
+        let (path, standing) = (digest(&self.best.plan.path), standing.clone());
+        self.made.push(Made { widths: widths.clone(), path, standing });
+    }
+
+    /// Whether a plan by these very widths was looked at, and all that it leaves where that is `measured`.
+    fn was_made(&self, widths: &Widths, measured: bool) -> bool {
+        let is_known = |made: &Made| made.standing.round.measured || !measured;
+        self.made.iter().any(|made| made.widths == *widths && is_known(made))
     }
 
     /// Whether all widths of a plan differ from those of the best, and no more than the ends of passes: they
@@ -395,43 +469,44 @@ impl Corrected<'_> {
         are_ends_alone(least.min(most), cutting_length(planned) / before.cutting_length_mm)
     }
 
-    /// What the best plan leaves, as that of another with other ends of passes.
-    fn as_before(&self, planned: &Planned, factors: [f64; 2]) -> Standing {
-        let Standing { round, above, depth, unreached } = &self.tried.standing;
-        let round = CorrectionRound {
+    /// What a plan leaves that comes out as one before, all of it where that is `measured`; or but for the ends
+    /// of passes as the best one.
+    fn as_before(&self, planned: &Planned, factors: [f64; 2], measured: bool) -> Option<Standing> {
+        let as_best = self.is_left_as_before(planned, factors).then_some(&self.tried.standing);
+        let path = digest(&planned.plan.path);
+        let is_alike = |made: &&Made| made.path == path && (made.standing.round.measured || !measured);
+        let alike = || self.made.iter().rfind(is_alike).map(|made| &made.standing);
+        let mut found = as_best.or_else(alike)?.clone();
+        found.round = CorrectionRound {
             factors,
             cutting_length_mm: cutting_length(planned),
             too_near_between_mm: too_near(planned),
-            ..*round
+            ..found.round
         };
-        Standing { round, above: above.clone(), depth: *depth, unreached: *unreached }
+        Some(found)
     }
 
     /// Keeps the best plan instead of this one.
     fn keep_best(&mut self, planned: &Planned, widths: Widths, found: Standing) -> Gain {
         self.rounds.push(found.round);
+        let (path, standing) = (digest(&planned.plan.path), found.clone());
+        self.made.push(Made { widths: widths.clone(), path, standing });
         self.latest = Some(Tried { widths, standing: found, kept: planned.plan.kept.clone() });
         Gain::None
     }
 
-    fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
-        match found.round.gain_over(&self.tried.standing.round, &self.goal) {
-            Gain::None => self.keep_best(&planned, widths, found),
-            gain => {
-                self.keep(planned, widths, found);
-                gain
-            }
+    /// Keeps this plan if it gains anything, or else the best one.
+    fn keep_if(&mut self, gain: Gain, planned: Planned, widths: Widths, found: Standing) {
+        if gain == Gain::None {
+            self.keep_best(&planned, widths, found);
+            return;
         }
-    }
-
-    /// Keeps this plan.
-    fn keep(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
         self.rounds.push(found.round);
         let tried = Tried { widths, standing: found, kept: planned.plan.kept.clone() };
         self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
         self.is_complete &= tried.widths.is_alike(&self.tried.widths);
         (self.best, self.tried, self.latest, self.kept) = (planned, tried, None, self.rounds.len() - 1);
-        Gain::Much
+        self.remember_best();
     }
 }
 
@@ -441,80 +516,4 @@ fn slack_of(map: &RidgeMap) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use scene::Scene;
-    use work::monitor::Silent;
-
-    /// A part of a wave under a ball of 6 mm.
-    const SCENE: &str = "[part]\nsurface = \"wave\"\namplitude = 0.8\nwavelength_x = 25\nwavelength_y = 30\nx = [-8, 8]\ny = [-8, 8]\n[cutter]\nshape = \"ball\"\n\
-                         diameter = 6\n[tolerance]\nscallop = 0.05\nchord = 0.005\n";
-
-    fn planned(correct: bool, toolpath: &str) -> report::ToolpathResult {
-        let text = format!("{SCENE}correct = {correct}\n[[toolpath]]\n{toolpath}\n");
-        let session = Session::new(Scene::parse("bump.toml", text).unwrap()).unwrap();
-        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result
-    }
-
-    fn figure(result: &report::ToolpathResult) -> Option<&serde_json::Value> {
-        result.figures.iter().find(|figure| figure.key == "correction").map(|figure| &figure.value)
-    }
-
-    /// Cells that show no pass tell nothing about a plan: it is made as by finer ones, and judged on these.
-    #[test]
-    fn coarse_cells_change_no_plan() {
-        let [fine, coarse] = [0.1, 4.0].map(|cell| {
-            let scene = format!("strategy = \"streamline\"\n[simulation]\ncell = {cell}");
-            planned(true, &scene)
-        });
-        let lengths = |result: &report::ToolpathResult| -> Vec<f64> {
-            let rounds = figure(result).unwrap()["rounds"].as_array().unwrap().clone();
-            rounds.iter().map(|round| round["cutting_length_mm"].as_f64().unwrap()).collect()
-        };
-        assert_eq!(lengths(&fine), lengths(&coarse));
-        assert_eq!([fine.verdict, coarse.verdict], [report::Verdict::Pass; 2]);
-    }
-
-    #[test]
-    fn rounds_bring_ridges_toward_the_target() {
-        for toolpath in ["strategy = \"streamline\"", "strategy = \"iso-parametric\""] {
-            let [open, closed] = [false, true].map(|correct| planned(correct, toolpath));
-            assert!(figure(&open).is_none());
-            let rounds = figure(&closed).unwrap()["rounds"].as_array().unwrap();
-            assert!((1..=MOST_ROUNDS + MOST_MEASURED_NEAR).contains(&rounds.len()));
-            let [before, after] = [&open, &closed].map(|result| result.scallop.max_mm.unwrap());
-            assert!(after <= before.max(0.05), "{toolpath}: {before} {after} {rounds:?}");
-        }
-        assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
-    }
-
-    /// On a slope of one degree the rim of a flat is an arc of r/sin 1° across the feed along the slope:
-    /// strips of 6.8 mm, and the low edge is cut by passes that run on until the rim has left it.
-    #[test]
-    fn a_flat_end_takes_the_strips_that_it_has() {
-        for toolpath in ["iso-scallop", "streamline", "iso-parametric"] {
-            let text = format!(
-                "[part]\nsurface = \"inclined_plane\"\nangle = 1\nx = [0, 40]\ny = [0, 40]\n[cutter]\nshape = \"flat\"\n\
-                 diameter = 20\n[[toolpath]]\nstrategy = \"{toolpath}\"\n"
-            );
-            let session = Session::new(Scene::parse("slope.toml", text).unwrap()).unwrap();
-            let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
-            assert_eq!(result.verdict, report::Verdict::Pass, "{toolpath}: {:?}", result.claims);
-            assert!(result.path.cutting_length_mm < 260.0, "{toolpath}: {}", result.path.cutting_length_mm);
-        }
-    }
-
-    /// A spiral leaves a corner of the part by a turn that stands 39 times as high as the target there: no
-    /// width matters, and a short pass of its own cuts it.
-    #[test]
-    fn a_corner_that_was_never_cut_gets_a_pass_of_its_own() {
-        let text = "[part]\nsurface = \"wave\"\namplitude = 0.5\nwavelength_x = 12\nx = [-4, 3.3]\ny = [-3, 3]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
-                    [tolerance]\nscallop = 0.0001\nchord = 1e-5\n[[toolpath]]\nstrategy = \"spiral\"\n";
-        let session = Session::new(Scene::parse("corner.toml", text.to_owned()).unwrap()).unwrap();
-        let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
-        let rounds = figure(&result).unwrap()["rounds"].as_array().unwrap();
-        let highest = |round: &serde_json::Value| round["border_mm"].as_f64().unwrap();
-        assert!(highest(&rounds[0]) > NEVER_CUT * 0.0001, "{rounds:?}");
-        assert_eq!(result.verdict, report::Verdict::Pass, "{rounds:?}");
-    }
-}
+mod tests;

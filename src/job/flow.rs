@@ -9,8 +9,8 @@ use io::digest;
 use metrology::{Engine, Measured, Measurement, ScallopFigures};
 use motion::Toolpath;
 use report::{
-    Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
-    Verdict,
+    Claim, ExcessReport, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport,
+    ToolpathResult, Verdict,
 };
 use scene::ToolpathRequest;
 use work::monitor::{self, Monitor};
@@ -208,7 +208,7 @@ impl Session {
             gouge: unseen
                 .map_or_else(|| measurement.gouge.clone(), |unseen| measurement.gouge.or(&unseen.gouge)),
             uncut: measurement.uncut.clone(),
-            excess: unseen.map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.excess)),
+            excess: self.excess(measurement, unseen),
             deviation: measurement.deviation,
             figures: found.figures,
             simulation: self.simulation_figures(engine, &measured, path),
@@ -280,6 +280,17 @@ impl Session {
             scallop.reason.get_or_insert_with(|| "the next toolpath cuts these ridges off".into());
         }
         scallop
+    }
+
+    /// The highest material, also where no cell sees. The highest that passes reached is left out where its bound
+    /// says nothing.
+    fn excess(&self, measurement: &Measurement, unseen: Option<&Measurement>) -> ExcessReport {
+        let excess = unseen.map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.excess));
+        if judge::hides_reached(&excess, &self.scene.tolerance, &self.scene.scallop_rule) {
+            let reason = Some("uncut material stands as high as ridges may".into());
+            return ExcessReport { reached: None, reason, ..excess.into() };
+        }
+        excess.into()
     }
 
     fn simulation_figures(

@@ -13,7 +13,7 @@
 //!
 //! What else is limited is claimed by the figures of [`figures`](super::figures).
 
-use metrology::{Bounded, Limits, Measurement, ScallopRule};
+use metrology::{Bounded, ExcessFigures, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 use sim::NOT_CUT;
 
@@ -135,19 +135,27 @@ fn is_below_scallop(measured: &Measurement) -> bool {
 /// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a
 /// border.
 pub(crate) fn highest_reached(measured: &Measurement) -> Bounded {
+    let reached = measured.excess.reached;
+    highest_ridge(measured).map_or(reached, |ridge| ridge.or(&reached))
+}
+
+/// The highest ridge with its own bound; `None` without ridges.
+fn highest_ridge(measured: &Measurement) -> Option<Bounded> {
     let figures = &measured.scallop;
-    let ridges = figures.max_mm.map(|height| Bounded {
+    figures.max_mm.map(|height| Bounded {
         at_mm: figures.max_at_mm,
         ..Bounded::new(height, figures.error_bound_mm.unwrap_or(f64::INFINITY))
-    });
-    let reached = measured.excess.reached;
-    ridges.map_or(reached, |ridges| ridges.or(&reached))
+    })
 }
 
 /// The highest ridge or remnant along a border.
 fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim {
-    let all = highest_reached(measured);
-    let limit = rule.highest * limits.scallop;
+    let (all, limit) = (highest_reached(measured), rule.highest * limits.scallop);
+    // A ridge that violates the limit by itself has its own bound: where it turns into uncut material, nothing tells
+    // how high what passes left stands elsewhere.
+    let ridge = highest_ridge(measured);
+    let violates = |ridge: &Bounded| ridge.max_mm == all.max_mm && ridge.stands_mm() > limit;
+    let all = ridge.filter(violates).unwrap_or(all);
     let what = match measured.scallop.max_mm {
         Some(ridge) if ridge >= measured.excess.reached.max_mm => "the highest scallop",
         _ => "the highest scallop or remnant beside a border",
@@ -216,6 +224,12 @@ fn is_hidden(highest: &Claim, uncut: &Claim) -> bool {
 /// Whether uncut material [hides](is_hidden) what passes left.
 pub(crate) fn hides_scallops(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> bool {
     is_hidden(&highest(measured, limits, rule), &uncut(measured, limits))
+}
+
+/// Whether uncut material [hides](is_hidden) the highest place that passes reached.
+pub(crate) fn hides_reached(excess: &ExcessFigures, limits: &Limits, rule: &ScallopRule) -> bool {
+    let reached = claim("scallop", rule.highest * limits.scallop, &excess.reached);
+    is_hidden(&reached, &claim("uncut", limits.uncut, &excess.unreached))
 }
 
 /// The claim without its figure, which says nothing.

@@ -423,8 +423,8 @@ mod tests {
         let [moves, arcs] = ["", "arcs = 0.002\n"].map(result);
         let bounds = |result: &report::ToolpathResult| {
             let (excess, scallop) = (&result.excess, &result.scallop);
-            let most =
-                [excess.highest, excess.reached, excess.unreached].map(|highest| highest.error_bound_mm);
+            let most = [excess.highest, excess.reached.unwrap(), excess.unreached]
+                .map(|highest| highest.error_bound_mm);
             [result.gouge.error_bound_mm, result.uncut.error_bound_mm, scallop.error_bound_mm.unwrap()]
                 .into_iter()
                 .chain(most)

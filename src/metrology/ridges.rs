@@ -451,19 +451,21 @@ impl Measurement {
     }
 }
 
-/// Figures of all ridge samples (height and length, mm).
+/// Figures of all ridge samples (height and length, mm). A height is what stands above the design: it is 0 where a
+/// ridge lies below.
 pub(super) fn scallop_figures(
     ridges: &[[f32; 2]],
     highest: Option<Highest>,
     limits: &Limits,
 ) -> ScallopFigures {
     let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
-    let samples = || ridges.iter().map(|s| s.map(f64::from));
+    let samples = || ridges.iter().map(|&[height, length]| [f64::from(height).max(0.0), f64::from(length)]);
     let total: f64 = samples().map(|[_, length]| length).sum();
     let (Some(highest), true) = (highest, total > 0.0) else {
         figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
+    let most = highest.height.max(0.0);
     let mut by_height = ridges.to_vec();
     by_height.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let quantile = |share: f64| {
@@ -475,18 +477,45 @@ pub(super) fn scallop_figures(
                 below >= share * total
             })
             // Samples are stored rounded.
-            .map_or(highest.height, |s| f64::from(s[0]).min(highest.height))
+            .map_or(most, |s| f64::from(s[0]).clamp(0.0, most))
     };
     // From 0.0, since an empty sum is -0.0.
     let over =
         samples().filter(|[height, _]| *height > limits.scallop).fold(0.0, |sum, [_, length]| sum + length);
-    figures.max_mm = Some(highest.height);
+    figures.max_mm = Some(most);
     figures.max_at_mm = Some(highest.at.into());
     figures.p95_mm = Some(quantile(0.95));
     figures.p50_mm = Some(quantile(0.5));
     figures.mean_mm = Some(samples().map(|[height, length]| height * length).sum::<f64>() / total);
     figures.over_target_fraction = Some(over / total);
     figures.ridge_length_mm = total;
-    figures.error_bound_mm = Some(highest.possible - highest.height + NUMERICAL_FLOOR);
+    figures.error_bound_mm = Some(highest.possible.max(0.0) - most + NUMERICAL_FLOOR);
     figures
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What lies below the design is a gouge: no ridge stands there.
+    #[test]
+    fn ridges_below_the_design_are_no_scallops() {
+        let limits = Limits { scallop: 0.01, ..crate::flat_scene::LIMITS };
+        let of = |ridges: &[[f32; 2]], height: f64| {
+            let highest = Highest { height, at: Point3::origin(), possible: height + 1e-3 };
+            let figures = scallop_figures(ridges, Some(highest), &limits);
+            let known = [figures.max_mm, figures.p95_mm, figures.p50_mm, figures.mean_mm];
+            (known.map(Option::unwrap), figures.error_bound_mm.unwrap())
+        };
+        let (below, bound) = of(&[[-0.25, 3.0], [-0.5, 1.0]], -0.25);
+        assert_eq!((below, bound), ([0.0; 4], NUMERICAL_FLOOR));
+        // Above and below in turn.
+        let (both, bound) = of(&[[0.25, 1.0], [-0.5, 3.0]], 0.25);
+        assert_eq!(both, [0.25, 0.25, 0.0, 0.0625]);
+        assert!((bound - 1e-3 - NUMERICAL_FLOOR).abs() < 1e-12, "{bound}");
+        // It may stand above by its bound.
+        let (nearly, bound) = of(&[[-0.0005, 1.0]], -0.0005);
+        assert_eq!(nearly[0], 0.0);
+        assert!((bound - 5e-4 - NUMERICAL_FLOOR).abs() < 1e-12, "{bound}");
+    }
 }

@@ -90,7 +90,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         scallop: measured.scallop,
         gouge: measured.gouge,
         uncut: measured.uncut,
-        excess: ExcessFigures::default(),
+        excess: ExcessFigures::default().into(),
         deviation: measured.deviation,
         figures: Vec::new(),
         simulation: SimulationFigures {

@@ -4,11 +4,11 @@ use base64::Engine as _;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::histogram::Histogram;
-use super::result::{RunReport, ToolpathReport, ToolpathResult};
+use super::result::{ExcessReport, RunReport, ToolpathReport, ToolpathResult};
 use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
 use super::time_plot;
 use super::verdict::{Claim, Verdict, place};
-use metrology::{ExcessFigures, ExcessKind};
+use metrology::ExcessKind;
 
 /// What the page shows of one toolpath besides its figures.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -288,7 +288,7 @@ fn data_url(png: &[u8]) -> String {
 }
 
 /// The highest material and what it is.
-fn highest_material(excess: &ExcessFigures) -> String {
+fn highest_material(excess: &ExcessReport) -> String {
     let what = match excess.kind {
         ExcessKind::None => "none found",
         ExcessKind::Scallop => "a scallop",

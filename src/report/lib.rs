@@ -30,8 +30,8 @@ pub use junit::{junit, xml_escaped};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use path_map::{PathLine, path_picture};
 pub use result::{
-    InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
-    ToolpathReport, ToolpathResult, WALL,
+    ExcessReport, InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures,
+    ToleranceFigures, ToolpathReport, ToolpathResult, WALL,
 };
 pub use stream_map::stream_picture;
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};

@@ -6,8 +6,8 @@ use serde::ser::{SerializeMap as _, Serializer};
 use super::figure::{Figure, by_key};
 use super::verdict::{Claim, Verdict};
 use metrology::{
-    DeviationFigures, ExcessFigures, GougeFigures, Limits, PathFigures, ScallopFigures, ScallopRule,
-    UncutFigures,
+    Bounded, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, Limits, PathFigures, ScallopFigures,
+    ScallopRule, UncutFigures,
 };
 
 /// The claim that no wall of a pocket is cut.
@@ -74,7 +74,7 @@ pub struct ToolpathResult {
     /// Uncut material.
     pub uncut: UncutFigures,
     /// The highest material anywhere.
-    pub excess: ExcessFigures,
+    pub excess: ExcessReport,
     /// Deviation in all.
     pub deviation: DeviationFigures,
     /// All other figures, in the order of their list.
@@ -210,6 +210,30 @@ pub struct InputFile {
     pub bytes: u64,
     /// Its SHA-256, in hexadecimal.
     pub sha256: String,
+}
+
+/// The highest material of a toolpath, as report.json has it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ExcessReport {
+    /// The highest of all.
+    #[serde(flatten)]
+    pub highest: Bounded,
+    /// What it is.
+    pub kind: ExcessKind,
+    /// The highest where passes came down to the design; `None` where its bound says nothing.
+    pub reached: Option<Bounded>,
+    /// The highest elsewhere.
+    pub unreached: Bounded,
+    /// Why a figure is missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+impl From<ExcessFigures> for ExcessReport {
+    fn from(excess: ExcessFigures) -> Self {
+        let ExcessFigures { highest, kind, reached, unreached } = excess;
+        Self { highest, kind, reached: Some(reached), unreached, reason: None }
+    }
 }
 
 /// All that is reported of one run, in the order of report.json.

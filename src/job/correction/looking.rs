@@ -25,6 +25,8 @@ pub(crate) struct Looked {
     pub(super) is_as_verdict: bool,
     /// What that covers, where [`Session::look`] asks for it.
     pub covered: Option<Covered>,
+    /// Whether what no cell sees was left out.
+    pub(super) of_cells_alone: bool,
 }
 
 impl Looked {
@@ -32,6 +34,12 @@ impl Looked {
     pub(super) fn unseen(&self) -> Option<&Measurement> {
         let unseen = self.covered.as_ref()?.unseen.as_ref()?;
         (!unseen.never_cut).then_some(&unseen.measurement)
+    }
+
+    /// Whether a place that no cell sees was never cut.
+    pub(super) fn is_never_cut(&self) -> bool {
+        let unseen = self.covered.as_ref().and_then(|covered| covered.unseen.as_ref());
+        unseen.is_some_and(|unseen| unseen.never_cut)
     }
 }
 
@@ -62,19 +70,41 @@ impl Session {
         closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Looked, JobError> {
-        let (cutters, holders) = self.tools(request);
+        monitor.start("measuring a plan", 0);
+        let (cutters, _) = self.tools(request);
         let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
         let all = (&*whole.path, &whole.cutters);
         let MeasuredClosely { measured, is_as_verdict } =
             self.measure_closely(request, engine, all, closeness, monitor)?;
-        let covered = match self.pocket {
-            None if self.verdict_on(&measured) != Verdict::Fail => {
-                let own = ToolMoves::of(&cutters, &holders, path);
-                Some(self.covered(request, &measured, all, &whole.tools(earlier, &own), monitor)?)
-            }
-            _ => None,
-        };
-        Ok(Looked { measured, is_as_verdict, covered })
+        let fails = self.verdict_on(&measured) == Verdict::Fail;
+        let of_cells_alone = self.pocket.is_none();
+        let mut looked = Looked { measured, is_as_verdict, covered: None, of_cells_alone };
+        if !fails {
+            self.look_beside_cells(request, earlier, path, &mut looked, monitor)?;
+        }
+        Ok(looked)
+    }
+
+    /// Measures where no cell sees as well, unless that was done.
+    pub(super) fn look_beside_cells(
+        &self,
+        request: &ToolpathRequest,
+        earlier: &[EarlierPath],
+        path: &Toolpath,
+        looked: &mut Looked,
+        monitor: &dyn Monitor,
+    ) -> Result<(), JobError> {
+        if !looked.of_cells_alone {
+            return Ok(());
+        }
+        monitor.start("measuring the coverage", 0);
+        let (cutters, holders) = self.tools(request);
+        let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
+        let (all, own) = ((&*whole.path, &whole.cutters), ToolMoves::of(&cutters, &holders, path));
+        let tools = whole.tools(earlier, &own);
+        looked.covered = Some(self.covered(request, &looked.measured, all, &tools, monitor)?);
+        looked.of_cells_alone = false;
+        Ok(())
     }
 
     /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse

@@ -39,8 +39,12 @@ pub(crate) struct CorrectionRound {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub too_near_between_mm: Option<f64>,
     /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them. A plan
-    /// that differs from the best one before by the ends of its passes only has the figures of that one.
+    /// that differs from the best one before by the ends of its passes only has the figures of that one, and so
+    /// has one that comes out as an earlier one.
     pub measured: bool,
+    /// Whether what no cell sees was left out: no less stands with it, and the plan before was better already.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub of_cells_alone: bool,
 }
 
 /// The rounds of the loop.
@@ -144,6 +148,7 @@ mod tests {
             factors: [1.0; 2],
             too_near_between_mm: None,
             measured: true,
+            of_cells_alone: false,
         };
         let strict = Goal { target: 1.0, rule: ScallopRule::default() };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, &strict);

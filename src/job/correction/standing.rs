@@ -1,7 +1,10 @@
 //! What a plan leaves above the design, as the loop sees it.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+
 use geometry::Point3;
 use metrology::{Bounded, RidgeMap, path_figures};
+use motion::Toolpath;
 use part::Part;
 use toolpath::Faces;
 
@@ -12,6 +15,7 @@ use crate::judge::highest_reached;
 use crate::planned::Planned;
 
 /// What a plan leaves above the design.
+#[derive(Clone)]
 pub(super) struct Standing {
     /// As a round tells it, its length and factors aside.
     pub(super) round: CorrectionRound,
@@ -21,6 +25,8 @@ pub(super) struct Standing {
     pub(super) depth: f64,
     /// How high stands for certain what it does not reach, mm; 0 while only ridges are measured.
     pub(super) unreached: f64,
+    /// Whether it never cuts a place that no cell sees, whose height is left out.
+    pub(super) is_never_cut: bool,
 }
 
 impl Standing {
@@ -42,11 +48,13 @@ impl Standing {
             factors,
             too_near_between_mm: too_near(planned),
             measured: false,
+            of_cells_alone: false,
         };
         let places = map.above.iter().map(|place| (place.at, place.height));
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
-        let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0, unreached: 0.0 };
+        let above = places.chain(highest).collect();
+        let standing = Self { round, above, depth: 0.0, unreached: 0.0, is_never_cut: false };
         Some(standing.served(&planned.plan.kept.faces, wanted))
     }
 
@@ -69,6 +77,7 @@ impl Standing {
             factors,
             too_near_between_mm: too_near(planned),
             measured: true,
+            of_cells_alone: looked.of_cells_alone,
         };
         let places = measured.above.iter().chain(unseen.iter().flat_map(|unseen| &unseen.above));
         let places = places.map(|place| (place.at, place.height));
@@ -76,8 +85,10 @@ impl Standing {
         let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
         let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
-        let unreached = measured.excess.unreached.at_least_mm;
-        Self { round, above, depth, unreached }.served(&planned.plan.kept.faces, wanted)
+        let of_unseen = unseen.map_or(0.0, |unseen| unseen.excess.unreached.at_least_mm);
+        let unreached = measured.excess.unreached.at_least_mm.max(of_unseen);
+        let is_never_cut = looked.is_never_cut();
+        Self { round, above, depth, unreached, is_never_cut }.served(&planned.plan.kept.faces, wanted)
     }
 
     /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once
@@ -131,4 +142,15 @@ pub(super) fn cutting_length(planned: &Planned) -> f64 {
 /// [`CorrectionRound::too_near_between_mm`] of a plan.
 pub(super) fn too_near(planned: &Planned) -> Option<f64> {
     Some(planned.plan.too_near_between).filter(|missing| *missing > 0.0)
+}
+
+/// What tells paths apart: equal ones have equal numbers.
+pub(super) fn digest(path: &Toolpath) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    for step in &path.moves {
+        let place = step.to.tip.iter().chain(step.to.axis.iter());
+        place.for_each(|x| x.to_bits().hash(&mut hasher));
+        (step.kind as u8).hash(&mut hasher);
+    }
+    hasher.finish()
 }

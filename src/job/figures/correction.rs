@@ -15,13 +15,18 @@ const MEANING: (&str, &str) = (
      near it, apart. Then the path is planned again, a dozen plans at most, and the best one is kept.",
 );
 
+/// The highest of all, µm. Of cells alone the bound is not that of the whole surface.
+fn highest(round: &CorrectionRound) -> String {
+    with_bound(Some(round.highest()), round.error_bound_mm.filter(|_| !round.of_cells_alone))
+}
+
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(correction) = &run.planned.correction else { return Ok(Finding::default()) };
     let row = |(k, round): (usize, &CorrectionRound)| {
         let [least, most] = round.factors;
         vec![
             format!("{}{}", k + 1, if k + 1 == correction.kept { ", kept" } else { "" }),
-            with_bound(Some(round.highest()), round.error_bound_mm),
+            highest(round),
             if round.is_on_border() { "border" } else { "ridge" }.to_owned(),
             micrometres(round.median_mm),
             format!("{:.0}", round.cutting_length_mm),
@@ -35,8 +40,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         columns: vec!["plan", "highest, µm", "which", "median, µm", "length, mm", "widths by"],
         rows: correction.rounds.iter().enumerate().map(row).collect(),
     };
-    let heights = correction.rounds.iter().map(|r| with_bound(Some(r.highest()), r.error_bound_mm));
-    let heights: Vec<String> = heights.collect();
+    let heights: Vec<String> = correction.rounds.iter().map(highest).collect();
     let name = &run.request.name;
     let several = heights.len() > 1;
     let figure = Figure {

@@ -199,12 +199,39 @@ fn a_bound_that_says_nothing_is_left_out_with_its_reason() {
         assert!(json["measured_mm"].is_null() && json["error_bound_mm"].is_null(), "{json}");
         assert!(json["reason"].is_string() && !json["text"].as_str().unwrap().contains('±'), "{json}");
     }
+    // In report.json beside the highest material, too.
+    let of_excess = |height: f64, bound: f64, uncut: f64| {
+        let (reached, unreached) = (Bounded::new(height, bound), Bounded::new(uncut, 0.001));
+        let excess = ExcessFigures { reached, unreached, ..ExcessFigures::default() };
+        hides_reached(&excess, &LIMITS, &STRICT)
+    };
+    assert!(of_excess(0.0, 7.269, 8.2));
+    assert!(!of_excess(0.0, 7.269, 0.0) && !of_excess(0.0098, 0.0005, 8.2) && !of_excess(0.3, 0.01, 8.2));
     // What is near its limit, or where a finer cell alone decides, keeps its figure.
     measured.excess.reached = Bounded::new(0.0098, 0.0005);
     assert_eq!(judged(&measured, &STRICT).1.last().unwrap().measured, Some(0.0098));
     measured.uncut = UncutFigures { error_bound_mm: 0.0005, ..UncutFigures::default() };
     measured.excess.reached = Bounded::new(0.0, 7.269);
     assert_eq!(judged(&measured, &STRICT).1.last().unwrap().measured, Some(0.0));
+}
+
+/// A ridge that turns into uncut material is as high as its own bound says, in the table and in the sentence.
+#[test]
+fn a_ridge_that_violates_its_limit_has_its_own_bound() {
+    let mut measured = measurement(0.0);
+    measured.scallop.max_mm = Some(0.337);
+    measured.scallop.error_bound_mm = Some(0.00032);
+    measured.excess.reached = Bounded { at_least_mm: 0.337, ..Bounded::new(0.337, 2.987) };
+    let claims = judged(&measured, &STRICT).1;
+    let scallop = claims.iter().find(|claim| claim.what == "scallop").unwrap();
+    assert_eq!((scallop.verdict(), scallop.error_bound), (Verdict::Fail, 0.00032));
+    assert!(scallop.sentence().contains("337 ± 0.32 µm"), "{}", scallop.sentence());
+    // A lower one leaves the limit to all that passes reached.
+    measured.scallop.max_mm = Some(0.009);
+    measured.excess.reached = Bounded::new(0.009, 2.987);
+    let claims = judged(&measured, &STRICT).1;
+    let scallop = claims.iter().find(|claim| claim.what == "scallop").unwrap();
+    assert_eq!(scallop.verdict(), Verdict::Undecided);
 }
 
 #[test]
