@@ -8,6 +8,7 @@ use millstream::cutter::{Cutter, Solid};
 use millstream::geometry::{Point3, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
+use millstream::parallel;
 use millstream::sim::Rays;
 
 /// Side of the part, mm.
@@ -72,9 +73,17 @@ fn deviations(bencher: Bencher, name: &str) {
     };
     let points: Vec<Point3> = (0..RAYS * RAYS).map(|k| at(k).0).collect();
     let normals: Vec<Vector3> = (0..RAYS * RAYS).map(|k| at(k).1).collect();
-    bencher
-        .counter(ItemsCount::new(points.len()))
-        .bench(|| rays.deviations(&points, &normals, 1.0, 1.0, &Silent).expect("never cancelled"));
+    // Each ray begins with the move that was found by the one before.
+    let of_row = |row: usize| {
+        let mut seed = None;
+        let hit = |k: usize| {
+            let found = rays.deviation_near(&points[k], &normals[k], [1.0, 1.0], seed);
+            seed = found.map(|(_, slot)| slot).or(seed);
+            found.map(|(hit, _)| hit)
+        };
+        (row * RAYS..(row + 1) * RAYS).map(hit).collect::<Vec<_>>()
+    };
+    bencher.counter(ItemsCount::new(points.len())).bench(|| parallel::map(RAYS, of_row));
 }
 
 #[divan::bench(sample_count = 3, args = ["ball", "ball leading"])]

@@ -7,7 +7,8 @@ use divan::counter::ItemsCount;
 use millstream::cutter::Cutter;
 use millstream::geometry::Point3;
 use millstream::monitor::Silent;
-use millstream::sim::{MoveBins, SweptMove, cut_in_order, cut_in_order_plain, cut_reference};
+use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
+use millstream::sim::{Envelope, MoveBins, cut_in_order, cut_in_order_plain, cut_reference};
 
 #[path = "common/wave.rs"]
 mod wave;
@@ -46,11 +47,14 @@ fn bins(bencher: Bencher) {
 /// One evaluation each at places all around a move, of a rising move of 0.4 mm.
 #[divan::bench(args = ["ball", "flat", "bull", "taper"])]
 fn swept_move(bencher: Bencher, name: &str) {
-    let swept = SweptMove::new(&cutter(name), Point3::origin(), Point3::new(0.37, 0.12, 0.15));
+    let to = ClPoint::upright(Point3::new(0.37, 0.12, 0.15));
+    let only = Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 };
+    let path = Toolpath::new(ClPoint::upright(Point3::origin()), vec![only]);
+    let swept = Envelope::new(cutter(name), &path);
     bencher.counter(ItemsCount::new(100usize * 100)).bench(|| {
         let at = |k: usize| -3.0 + 0.0637 * k as f64;
         let heights = (0..100).flat_map(|j| (0..100).map(move |i| (i, j)));
-        heights.filter_map(|(i, j)| swept.height(at(i), at(j))).sum::<f64>()
+        heights.filter_map(|(i, j)| swept.height(0, at(i), at(j))).sum::<f64>()
     });
 }
 

@@ -8,7 +8,7 @@ use super::{Plan, Section};
 use millstream::cutter::Cutter;
 use millstream::monitor::Silent;
 use millstream::motion::Toolpath;
-use millstream::sim::{MoveBins, SweptMove, Work, ZMap};
+use millstream::sim::{Envelope, MoveBins, Work, ZMap};
 use millstream::sim::{
     cut, cut_all_candidates, cut_counted, cut_in_order, cut_in_order_plain, cut_reference,
 };
@@ -65,7 +65,7 @@ fn cut_plainly(mut map: ZMap, cutter: &Cutter, path: &Toolpath) -> ZMap {
     /// Cells along the side of a tile.
     const SIDE: usize = 64;
     let grid = map.grid;
-    let bins = MoveBins::new(&grid, SIDE, RADIUS, path);
+    let (bins, envelope) = (MoveBins::new(&grid, SIDE, RADIUS, path), Envelope::new(cutter, path));
     // Cells of one axis between two places.
     let between = |first: f64, range: std::ops::Range<usize>, a: f64, b: f64| {
         let cell = |x: f64| (x - first) / grid.cell;
@@ -76,12 +76,11 @@ fn cut_plainly(mut map: ZMap, cutter: &Cutter, path: &Toolpath) -> ZMap {
         for i0 in (0..grid.nx).step_by(SIDE) {
             for &index in bins.of_bin(i0 / SIDE, j0 / SIDE) {
                 let (from, to) = (path.start_of(index as usize), path.moves[index as usize].to.tip);
-                let swept = SweptMove::new(cutter, from, to);
                 let columns = between(grid.origin.x, i0..(i0 + SIDE).min(grid.nx), from.x, to.x);
                 for j in between(grid.origin.y, j0..(j0 + SIDE).min(grid.ny), from.y, to.y) {
                     for i in columns.clone() {
                         let (p, k) = (grid.centre(i, j), grid.index(i, j));
-                        let height = swept.height(p.x, p.y).map_or(f32::INFINITY, |h| h as f32);
+                        let height = envelope.height(index, p.x, p.y).map_or(f32::INFINITY, |h| h as f32);
                         if height < map.height[k] {
                             (map.height[k], map.cut_by[k]) = (height, index);
                         }

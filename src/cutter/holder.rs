@@ -1,6 +1,8 @@
 //! What holds the cutter and must not touch the part: the shank above the cutting length and the
 //! stacked sections of the holder. mm, heights above the tip.
 
+use keys::{SceneError, Section};
+
 /// Lengths and diameters from this on are no holder's, mm.
 const GREATEST: f64 = 1.0e4;
 
@@ -13,6 +15,22 @@ pub struct HolderSection {
     pub top_diameter: f64,
     /// Its height.
     pub length: f64,
+}
+
+impl HolderSection {
+    /// Reads the table of one.
+    ///
+    /// # Errors
+    /// [`SceneError`] where a key is missing, unknown or out of range.
+    pub fn read(table: &Section<'_>) -> Result<Self, SceneError> {
+        table.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
+        let diameter = table.required_length("diameter", 32.0)?.value;
+        Ok(Self {
+            diameter,
+            top_diameter: table.length_or("top_diameter", diameter)?,
+            length: table.required_length("length", 40.0)?.value,
+        })
+    }
 }
 
 /// Shank and holder, section on section upward from the end of the cutting length.

@@ -33,7 +33,7 @@ pub use fit::{DIRECTION_WEIGHT, FieldError, NormalEquations, StreamFit, StreamSa
 pub use grid::GridField;
 pub use knots::{KnotRule, averaged_knots, equal_shares, weighted_knots};
 pub use levels::{LevelCurve, LevelTracer};
-pub use packed::{Gradients, Minimiser, Packed, Roughness, Rounds, Site, Tied, minimise, minimise_priced};
+pub use packed::{Gradients, Minimiser, Packed, Roughness, Rounds, Site, Tied, minimise};
 pub use planar::{PlanarError, PlanarMesh, fill};
 pub use planned::{DirectionError, FeedSample, LevelLine, PassPoint, PlannedField, ShortestPossible};
 pub use scalar::{Axis, ScalarField, ScalarSpline, surface_gradient_length};

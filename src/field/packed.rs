@@ -20,7 +20,7 @@
 //! cutter. On a surface of curvatures ±κ the two prefer opposite directions.
 //!
 //! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at
-//! borders may have a price ([`minimise_priced`]), and `c` may hold one of turning.
+//! borders may have a price ([`minimise`]), and `c` may hold one of turning.
 //!
 //! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense
 //! as they must be, and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980),
@@ -234,26 +234,11 @@ pub enum Rounds {
     Last,
 }
 
-/// Minimises from `start`.
+/// Minimises from `start`, where each end of a pass at a border costs `end` more, mm.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so; `Ok(None)` where sites do not determine the function.
 pub fn minimise(
-    sites: &[Site],
-    gradients: &Gradients,
-    roughness: &Roughness,
-    start: Vec<f64>,
-    rounds: Rounds,
-    monitor: &dyn Monitor,
-) -> Result<Option<Packed>, Cancelled> {
-    minimise_priced(sites, gradients, roughness, 0.0, start, rounds, monitor)
-}
-
-/// [`minimise`] where each end of a pass at a border costs `end` more, mm.
-///
-/// # Errors
-/// As [`minimise`].
-pub fn minimise_priced(
     sites: &[Site],
     gradients: &Gradients,
     roughness: &Roughness,
@@ -266,7 +251,7 @@ pub fn minimise_priced(
     minimiser.map_or(Ok(None), |minimiser| minimiser.run(end, start, rounds, monitor))
 }
 
-/// [`minimise_priced`] from any number of starts, which share one preconditioner: that depends on neither
+/// [`minimise`] from any number of starts, which share one preconditioner: that depends on neither
 /// start nor price.
 pub struct Minimiser<'a> {
     sites: &'a [Site],
@@ -282,7 +267,7 @@ impl<'a> Minimiser<'a> {
         Some(Self { sites, gradients, roughness, factor })
     }
 
-    /// As [`minimise_priced`].
+    /// As [`minimise`].
     ///
     /// # Errors
     /// As [`minimise`].
@@ -636,10 +621,10 @@ mod tests {
     }
 
     fn run((sites, gradients): &(Vec<Site>, Gradients), start: Vec<f64>) -> Packed {
-        let first = minimise(sites, gradients, &Roughness::default(), start, Rounds::First, &Silent)
+        let first = minimise(sites, gradients, &Roughness::default(), 0.0, start, Rounds::First, &Silent)
             .unwrap()
             .unwrap();
-        minimise(sites, gradients, &Roughness::default(), first.coefficients, Rounds::Last, &Silent)
+        minimise(sites, gradients, &Roughness::default(), 0.0, first.coefficients, Rounds::Last, &Silent)
             .unwrap()
             .unwrap()
     }
@@ -693,7 +678,7 @@ mod tests {
         let passes = |end: f64| {
             let rough = Roughness::default();
             let start = straight(0.7, 20.0);
-            let found = minimise_priced(&sites, &gradients, &rough, end, start, Rounds::First, &Silent);
+            let found = minimise(&sites, &gradients, &rough, end, start, Rounds::First, &Silent);
             found.unwrap().unwrap().passes
         };
         let [free, dear] = [passes(0.0), passes(0.3)];
@@ -758,8 +743,7 @@ mod tests {
         let shared = Minimiser::new(&sites, &gradients, &rough).unwrap();
         for (angle, end) in [(0.2, 0.0), (1.1, 0.3), (2.3, 0.1)] {
             let start = straight(angle, 15.0);
-            let alone =
-                minimise_priced(&sites, &gradients, &rough, end, start.clone(), Rounds::First, &Silent);
+            let alone = minimise(&sites, &gradients, &rough, end, start.clone(), Rounds::First, &Silent);
             assert_eq!(shared.run(end, start, Rounds::First, &Silent), alone);
         }
     }
@@ -768,11 +752,19 @@ mod tests {
     fn what_determines_nothing_is_refused() {
         let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], false);
         assert_eq!(
-            minimise(&sites, &gradients, &Roughness::default(), vec![0.0; 3], Rounds::First, &Silent),
+            minimise(&sites, &gradients, &Roughness::default(), 0.0, vec![0.0; 3], Rounds::First, &Silent),
             Ok(None)
         );
         assert_eq!(
-            minimise(&[], &Gradients::new(4), &Roughness::default(), vec![0.0; 4], Rounds::First, &Silent),
+            minimise(
+                &[],
+                &Gradients::new(4),
+                &Roughness::default(),
+                0.0,
+                vec![0.0; 4],
+                Rounds::First,
+                &Silent
+            ),
             Ok(None)
         );
     }

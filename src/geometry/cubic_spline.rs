@@ -239,14 +239,8 @@ impl CubicSpline {
         if speed > 0.0 { first.perp(&second) / (speed * speed * speed) } else { 0.0 }
     }
 
-    /// Third derivative, which is constant within a span. Span `k` starts at point `k`; there is one less
-    /// than points, or as many when closed (then `span` wraps; else the last one stands for what is beyond).
-    pub fn third(&self, span: usize) -> Vector2 {
-        let spans = self.spans();
-        self.span(if self.closed { span % spans } else { span.min(spans - 1) }).third()
-    }
-
-    /// By how much the third derivative jumps at each point; zero at the ends of open splines.
+    /// By how much the third derivative, which is constant within a span, jumps at each point; zero at the
+    /// ends of open splines.
     pub fn third_jumps(&self) -> Vec<Vector2> {
         let thirds: Vec<Vector2> = (0..self.spans()).map(|k| self.span(k).third()).collect();
         let jump = |k: usize| match (k.checked_sub(1), thirds.get(k)) {

@@ -34,7 +34,7 @@ pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{BoxTree, Bvh, Extent, Feature, MeshFoot, Node, Paired, VerticalHit, round_down, round_up};
-pub use coordinates::{Isometry3, MAX_COORDINATE, Point2, Point3, Vector2, Vector3};
+pub use coordinates::{Isometry3, MAX_COORDINATE, Point2, Point3, Vector2, Vector3, angle_between};
 pub use cover::RimSamples;
 pub use cubic_spline::{ArcLength, CubicSpline, SplineError};
 pub use interpolate::{InterpolationAxis, interpolate};

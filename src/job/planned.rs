@@ -58,6 +58,19 @@ pub(crate) struct Planned {
 }
 
 impl Planned {
+    fn new(plan: Plan, strategy: Box<dyn Strategy>, header: ProgramHeader) -> Self {
+        Self {
+            plan,
+            strategy,
+            joints: None,
+            header,
+            engaged: None,
+            engaged_thinly: None,
+            correction: None,
+            equal_time: None,
+        }
+    }
+
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let (path, machine) = (&self.plan.path, &scene.machine);
@@ -117,16 +130,7 @@ impl Session {
         let strategy = self.strategy(request)?;
         if let Some(read) = request.foreign() {
             let plan = Plan::of_path(read.path.clone(), read.notes.clone());
-            return Ok(Planned {
-                plan,
-                strategy,
-                joints: None,
-                header: self.header(request, None),
-                engaged: None,
-                engaged_thinly: None,
-                correction: None,
-                equal_time: None,
-            });
+            return Ok(Planned::new(plan, strategy, self.header(request, None)));
         }
         let places = Places { boundary: request.boundary.clone(), rest: around.rest.cloned() };
         let settings = PlanSettings { earlier, places, ..self.settings(request) };
@@ -166,16 +170,7 @@ impl Session {
             plan.path.origin.strays += tip + axis * around.tool.cutter.reach();
             plan.path.origin.leans = axis;
         }
-        Ok(Planned {
-            plan,
-            strategy,
-            joints,
-            header,
-            engaged,
-            engaged_thinly,
-            correction: None,
-            equal_time: None,
-        })
+        Ok(Planned { joints, engaged, engaged_thinly, ..Planned::new(plan, strategy, header) })
     }
 
     fn path(

@@ -8,4 +8,4 @@ mod write;
 pub use error::{Finding, SceneError, SceneText, listed, nearest, suggestion};
 pub use printable::{printable, printable_lines};
 pub use section::{COORDINATE, LENGTH, Located, Section};
-pub use write::{toml_number, toml_string, word_of};
+pub use write::{toml_number, toml_numbers, toml_points, toml_string, word_of};

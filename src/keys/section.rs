@@ -88,6 +88,11 @@ impl<'a> Section<'a> {
         self.source.error(span.clone(), message, cure)
     }
 
+    /// An error at the name of a key (at the header if it is not there).
+    pub fn key_error(&self, key: &str, message: impl Into<String>, cure: impl Into<String>) -> SceneError {
+        self.error(&self.key_span(key), message, cure)
+    }
+
     /// Where the section's header stands.
     pub fn header(&self) -> &Range<usize> {
         &self.span
@@ -283,6 +288,17 @@ impl<'a> Section<'a> {
         self.in_range(key, entry, &range, unit).map(Some)
     }
 
+    /// As [`Self::number`], with a value for where the key is not there.
+    pub fn number_or(
+        &self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        unit: &str,
+        default: f64,
+    ) -> Result<f64, SceneError> {
+        Ok(self.number(key, range, unit)?.map_or(default, |number| number.value))
+    }
+
     fn in_range(
         &self,
         key: &str,
@@ -306,6 +322,11 @@ impl<'a> Section<'a> {
     /// A positive length, mm.
     pub fn length(&self, key: &str) -> Result<Option<Located<f64>>, SceneError> {
         self.number(key, LENGTH, " mm")
+    }
+
+    /// As [`Self::length`], with a value for where the key is not there.
+    pub fn length_or(&self, key: &str, default: f64) -> Result<f64, SceneError> {
+        self.number_or(key, LENGTH, " mm", default)
     }
 
     /// Positive lengths, mm, as `[0.4, 0.2]`; none when the key is not there.

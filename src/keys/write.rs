@@ -1,10 +1,23 @@
 //! Values as TOML spells them.
 
+use geometry::Point2;
+
 /// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
 /// back as it was written.
 pub fn toml_number(value: f64) -> String {
     let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
     format!("{rounded:?}")
+}
+
+/// Numbers as a list.
+pub fn toml_numbers(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| toml_number(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// Points as a list of lists.
+pub fn toml_points(points: &[Point2]) -> String {
+    let all: Vec<String> = points.iter().map(|p| toml_numbers(p.coords.as_slice())).collect();
+    format!("[{}]", all.join(", "))
 }
 
 /// A string between quotes.

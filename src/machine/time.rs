@@ -34,7 +34,7 @@ use std::ops::Range;
 use super::Machine;
 use super::axis_limits::time_of_linear;
 use super::jerk;
-use geometry::Vector3;
+use geometry::{Vector3, angle_between};
 use motion::{Move, MoveKind, Toolpath};
 use work::monitor::{Cancelled, Monitor};
 
@@ -142,7 +142,7 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> 
         let mut block = Block { step: k, length, direction, line, rests, feed, ..Block::default() };
         rests = false;
         if let Some(last) = blocks.last().filter(|_| !block.rests) {
-            let turn = last.direction.cross(&direction).norm().atan2(last.direction.dot(&direction));
+            let turn = angle_between(&last.direction, &direction);
             block.bend_from(last, turn, machine);
         }
         blocks.push(block);

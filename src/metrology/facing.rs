@@ -115,11 +115,6 @@ impl<'a> Facing<'a> {
         Self { part, axes, block, overlaps, soup: part.mesh().surface().is_err() }
     }
 
-    /// Whether all axes are upright.
-    pub fn is_upright(&self) -> bool {
-        self.axes.is_empty()
-    }
-
     /// The block.
     pub fn block(&self) -> &Aabb {
         &self.block

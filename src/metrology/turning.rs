@@ -5,7 +5,7 @@
 //! distance, rad a mm.
 
 use cutter::Cutter;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::{MoveKind, PassStretches, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
@@ -42,7 +42,7 @@ pub fn fastest_turn(
     let turns = work::parallel::try_map(path.len(), |k| {
         monitor::check(monitor)?;
         let (from, step) = (path.location_before(k), &path.moves[k]);
-        let turn = angle(&from.axis, &step.to.axis);
+        let turn = angle_between(&from.axis, &step.to.axis);
         if step.kind != MoveKind::Cut || turn <= NO_TURN {
             return Ok(None);
         }
@@ -90,7 +90,7 @@ pub fn fastest_turn_across(
         let Stretch { contacts: [_, at], axes: [_, axis], pass, move_index } = &stretches[k];
         let near = beside.beside(at, *pass, 2.0 * cutter.radius());
         let rates = near.iter().filter_map(|one| {
-            let turn = angle(axis, &stretches[one.stretch as usize].axis_at(one.at));
+            let turn = angle_between(axis, &stretches[one.stretch as usize].axis_at(one.at));
             (turn > NO_TURN).then(|| turn / one.distance)
         });
         Ok(rates.max_by(f64::total_cmp).map(|rate| FastestTurn { rate, move_index: *move_index, at: *at }))
@@ -111,11 +111,6 @@ impl Stretch {
         let [from, to] = self.axes;
         (from + (to - from) * share).try_normalize(1e-9).unwrap_or(to)
     }
-}
-
-/// Between two directions, rad.
-fn angle(a: &Vector3, b: &Vector3) -> f64 {
-    a.cross(b).norm().atan2(a.dot(b))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::checks::{Measured, Study, studies};
 use super::published::{Ours, Published};
-use super::results::{Results, SceneResult, ToolpathResult};
+use super::results::{Case, Results, SceneResult, ToolpathResult};
 use super::table::Table;
 use super::words::{number, tick};
 
@@ -43,7 +43,7 @@ fn closed_forms(studies: &[Study<'_>]) -> Table {
         study.rows.iter().map(|row| {
             let shown = |value: f64| number(study.figure.shown(value));
             let error = 1e6 * study.error(row).abs();
-            let [engine, cell] = how(row);
+            let [engine, cell] = how(&row.scene.case);
             vec![
                 study.scene.to_owned(),
                 engine,
@@ -65,8 +65,7 @@ fn closed_forms(studies: &[Study<'_>]) -> Table {
 }
 
 /// The engine and the cell of a measurement.
-fn how(row: &Measured<'_>) -> [String; 2] {
-    let case = &row.scene.case;
+fn how(case: &Case) -> [String; 2] {
     [
         case.engine.clone().unwrap_or_else(|| "of the scene".to_owned()),
         case.cell_mm.map_or_else(|| "of the scene".to_owned(), tick),
@@ -105,7 +104,7 @@ fn agreement(studies: &[Study<'_>]) -> Table {
         }
     }
     let rows = found.iter().map(|Difference { row, figures, error, bound }| {
-        let [engine, cell] = how(row);
+        let [engine, cell] = how(&row.scene.case);
         vec![
             row.scene.case.scene.clone(),
             engine,
@@ -197,8 +196,7 @@ fn costs(results: &Results) -> Table {
     let rows = others.filter_map(|scene| {
         let cost = scene.cost_ratio()?;
         let plain = results.scene(&scene.case.scene).and_then(SceneResult::cost_ratio)?;
-        let cell = scene.case.cell_mm.map_or_else(|| "of the scene".to_owned(), tick);
-        let engine = scene.case.engine.clone().unwrap_or_else(|| "of the scene".to_owned());
+        let [engine, cell] = how(&scene.case);
         Some(vec![scene.case.scene.clone(), engine, cell, number(cost), number(cost / plain)])
     });
     Table::new(
@@ -213,7 +211,7 @@ fn costs(results: &Results) -> Table {
 #[cfg(test)]
 mod tests {
     use super::super::fixture::{results, scene};
-    use super::super::results::{Case, ClosedForm, Outcome};
+    use super::super::results::{ClosedForm, Outcome};
     use super::*;
 
     fn with(mut scene: SceneResult, change: impl Fn(&mut Vec<ToolpathResult>)) -> SceneResult {

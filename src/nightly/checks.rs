@@ -3,7 +3,9 @@
 //! A figure with an error bound says that the truth is within the bound. So it must agree with a closed form
 //! within its bound, and two measurements of one path within the sum of theirs.
 
-use super::compare::{Finding, capital, finding};
+use report::capital;
+
+use super::compare::{Finding, finding};
 use super::figures::{FIGURES, Figure};
 use super::results::{Results, SceneResult, ToolpathResult};
 use super::words::number;

@@ -1,7 +1,7 @@
 //! This nightly against a baseline: what got worse, what got better, what is new.
 
 use keys::printable;
-use report::Verdict;
+use report::{Verdict, capital};
 
 use super::checks::contradictions;
 use super::figures::{FIGURES, Figure};
@@ -205,11 +205,6 @@ impl Comparing<'_> {
 
 fn shown(figure: &Figure, value: f64) -> String {
     format!("{} {}", number(figure.shown(value)), figure.unit())
-}
-
-pub(crate) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

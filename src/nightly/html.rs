@@ -1,7 +1,8 @@
 //! report.html: one page that opens offline. What got worse first, then each figure with its change and its
 //! trend.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
+use report::html_document;
 
 use super::accuracy::tables;
 use super::compare::{Comparison, Finding};
@@ -27,41 +28,30 @@ pub fn html_page(
 ) -> String {
     let page = Page { baseline, history, rules };
     let class = if comparison.worse.is_empty() { "pass" } else { "fail" };
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Nightly report - millstream" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                header {
-                    h1 { "Nightly report" }
-                    p.verdict.(class) { (summary(results, comparison)) }
-                    p.faint { "millstream " (results.millstream) " · " (results.date) }
-                }
-                (findings("What got worse", "fail", &comparison.worse, results))
-                (findings("What got better", "pass", &comparison.better, results))
-                (findings("Notes", "", &comparison.notes, results))
-                section {
-                    h2 { "All scenes" }
-                    p.faint {
-                        "Under each value: its change since the baseline, and its line over the last nights if it changed. A \
-                         line spans the least to the greatest value; point at it for both. Cost is the CPU time over that of a fixed reference \
-                         computation."
-                    }
-                    @if history.skipped > 0 { p.faint { "Lines of the history that could not be read: " (history.skipped) "." } }
-                    div.scroll { (page.table(results, comparison)) }
-                }
-                (convergence::section(results))
-                @for table in tables(results) { (table.html()) }
-                (published::table(results, published).html())
-            }
+    let body = html! {
+        header {
+            h1 { "Nightly report" }
+            p.verdict.(class) { (summary(results, comparison)) }
+            p.faint { "millstream " (results.millstream) " · " (results.date) }
         }
+        (findings("What got worse", "fail", &comparison.worse, results))
+        (findings("What got better", "pass", &comparison.better, results))
+        (findings("Notes", "", &comparison.notes, results))
+        section {
+            h2 { "All scenes" }
+            p.faint {
+                "Under each value: its change since the baseline, and its line over the last nights if it changed. A \
+                 line spans the least to the greatest value; point at it for both. Cost is the CPU time over that of a fixed reference \
+                 computation."
+            }
+            @if history.skipped > 0 { p.faint { "Lines of the history that could not be read: " (history.skipped) "." } }
+            div.scroll { (page.table(results, comparison)) }
+        }
+        (convergence::section(results))
+        @for table in tables(results) { (table.html()) }
+        (published::table(results, published).html())
     };
-    markup.into_string()
+    html_document("Nightly report", STYLE, &body)
 }
 
 fn findings(title: &str, class: &str, findings: &[Finding], results: &Results) -> Markup {

@@ -115,7 +115,7 @@ impl Ours {
             pointer: pointer("figure")?.unwrap_or_default(),
             bound: pointer("bound")?,
             over: section.text("over")?.map(|over| over.value.to_owned()),
-            times: section.number("times", FACTORS, "")?.map_or(1.0, |times| times.value),
+            times: section.number_or("times", FACTORS, "", 1.0)?,
         })
     }
 

@@ -158,14 +158,13 @@ fn limit(
     let section = root.section(title)?;
     let allowed: Vec<&str> = ["relative"].into_iter().chain(absolute.map(|(key, _)| key)).collect();
     section.only(&allowed, &["absolute_um", "absolute_s"], &format!("[{title}]"))?;
-    let number = |key: &str| Ok::<_, SceneError>(section.number(key, RANGE, "")?.map(|found| found.value));
     let wanted = match absolute {
-        Some((key, unit)) => number(key)?.map(|value| value * unit),
+        Some((key, unit)) => section.number(key, RANGE, "")?.map(|found| found.value * unit),
         None => None,
     };
     Ok(Limit {
         absolute: wanted.unwrap_or(standard.absolute),
-        relative: number("relative")?.unwrap_or(standard.relative),
+        relative: section.number_or("relative", RANGE, "", standard.relative)?,
     })
 }
 
@@ -200,7 +199,7 @@ fn exact(section: &Section<'_>) -> Result<Exact, SceneError> {
         }
     };
     let ball = scallop::BallSection::new(radius, curvature).and_then(|ball| ball.height(step.value));
-    let within = section.number("within_um", 0.0..=1e3, " µm")?.map_or(0.0, |within| 1e-3 * within.value);
+    let within = 1e-3 * section.number_or("within_um", 0.0..=1e3, " µm", 0.0)?;
     let value =
         ball.map_err(|e| section.error(&step.span, format!("no scallop follows: {e}"), "mend the numbers"))?;
     Ok(Exact { scene, scallop: ClosedForm { value, within } })

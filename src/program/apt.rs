@@ -113,6 +113,7 @@ impl Frame {
 }
 
 /// A reader of locations.
+#[derive(Default)]
 struct Reader {
     out: Program,
     unit: f64,
@@ -176,34 +177,9 @@ pub fn looks_like_apt(bytes: &[u8]) -> bool {
 
 impl Reader {
     fn new(name: &str, lines: usize) -> Self {
-        let setting = Setting {
-            tool: 0,
-            spindle: Spindle::Off,
-            speed: 0.0,
-            register: 0,
-            length: [0.0; 3],
-            tip_kept: true,
-            work: 1,
-        };
+        let setting = Setting { tip_kept: true, work: 1, ..Setting::default() };
         let out = Program { name: name.to_owned(), lines, axes: vec![[0.0, 0.0, 1.0]], ..Program::default() };
-        Self {
-            out,
-            unit: 1.0,
-            rapid: false,
-            circle: None,
-            feed: 0.0,
-            per_revolution: false,
-            first: None,
-            described: 0,
-            head: None,
-            blamed: None,
-            frame: None,
-            setting,
-            changed: true,
-            at: Point3::origin(),
-            axis: Vector3::z(),
-            begun: false,
-        }
+        Self { out, unit: 1.0, setting, changed: true, axis: Vector3::z(), ..Self::default() }
     }
 
     fn run(&mut self, statement: &Statement) -> Result<(), Stop> {

@@ -244,8 +244,6 @@ impl Variables {
 pub struct Control {
     /// Its word on the command line and in scenes.
     pub word: &'static str,
-    /// What it is, in a line.
-    pub help: &'static str,
     /// Codes in tenths (G43.4 is 434) that differ from the common ones; `None` for those it does not have.
     pub codes: &'static [(u16, Option<Code>)],
     /// Whether G52 and G92 shift by the same register.
@@ -406,10 +404,10 @@ const COMMON: &[(u16, Code)] = &[
     (990, Code::Retract { initial: false }),
 ];
 
-/// What takes every word that any of the others takes.
+/// What takes every word that any of the others takes: words of Fanuc, Haas, LinuxCNC, Mach, grbl and Siemens
+/// in ISO mode together.
 pub const GENERAL: Control = Control {
     word: "general",
-    help: "words of Fanuc, Haas, LinuxCNC, Mach, grbl and Siemens in ISO mode together",
     codes: &[(51, QUIET), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
     one_shift: false,
     peck_clearance: 0.25,
@@ -436,7 +434,6 @@ pub const GENERAL: Control = Control {
 /// LinuxCNC 2.9, with the M words of its machines `xyzac-trt` and `xyzbc-trt` that switch kinematics.
 pub const LINUXCNC: Control = Control {
     word: "linuxcnc",
-    help: "LinuxCNC 2.9",
     codes: &[
         (90, None),
         (110, None),
@@ -479,7 +476,6 @@ pub const LINUXCNC: Control = Control {
 /// Fanuc 0i and 30i, milling; Siemens in ISO mode.
 pub const FANUC: Control = Control {
     word: "fanuc",
-    help: "Fanuc 0i and 30i for milling, and Siemens in its ISO mode",
     codes: &[
         (50, QUIET),
         (51, QUIET),
@@ -507,7 +503,6 @@ pub const FANUC: Control = Control {
 /// Haas mills.
 pub const HAAS: Control = Control {
     word: "haas",
-    help: "Haas mills",
     codes: &[(431, None), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
     cycle_repeats: (b"L", 0),
     variables: Variables { free: &[(1, 999), (10_000, 10_999)], ..FANUC.variables },
@@ -519,7 +514,6 @@ pub const HAAS: Control = Control {
 /// grbl 1.1: no cycles, no subprograms.
 pub const GRBL: Control = Control {
     word: "grbl",
-    help: "grbl 1.1",
     codes: &[
         // The only mode that it has.
         (610, QUIET),
@@ -550,7 +544,6 @@ pub const GRBL: Control = Control {
 /// Mach3 and Mach4.
 pub const MACH: Control = Control {
     word: "mach",
-    help: "Mach3 and Mach4",
     dwell_in_ms: false,
     cycle_repeats: (b"L", 0),
     dwell_takes_x: false,

@@ -231,9 +231,6 @@ pub enum Fault {
     /// The tool axis turns in a way that cannot be followed.
     #[error("the tool axis turns by half a turn in one move")]
     HalfTurn,
-    /// A cutter's words that make no cutter.
-    #[error("the CUTTER statement makes no cutter: {0}")]
-    Cutter(String),
     /// Motion along a CIRCLE that cannot be followed.
     #[error("the motion along the CIRCLE {0}")]
     Circle(String),
@@ -318,7 +315,6 @@ impl Fault {
             Self::Meanwhile(_) => "write G40 before it",
             Self::Rotary(_) => "name a machine with rotary axes in the scene ([machine.kinematics])",
             Self::HalfTurn => "put a location in between",
-            Self::Cutter(_) => "write CUTTER/diameter,corner radius or all seven numbers",
             Self::Circle(_) => {
                 "check CIRCLE (centre, axis, radius) and the locations around it, or write straight GOTO motion"
             }

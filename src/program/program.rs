@@ -57,7 +57,7 @@ pub enum Spindle {
 }
 
 /// What holds during some steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Setting {
     /// Number of the tool; 0 before the first change.
     pub tool: u32,

@@ -4,13 +4,12 @@
 //! scale, of equal aspect, with axes in mm. Teeth stand square on the curve, on the outer side of its bend,
 //! and are as long as it is curved.
 
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
+use super::plot::{Drawn, FAINT, GRID, INK, LETTERS, Page, letters, svg};
 use super::scale::{plain, round_up, ticks};
 use geometry::{CubicSpline, Point2, Vector2};
 
@@ -44,14 +43,8 @@ const LONGEST: f64 = 0.2;
 /// where it bends.
 const CHORDS: f64 = 1.0e-5;
 
-const INK: RGBColor = RGBColor(0x20, 0x24, 0x2a);
-const FAINT: RGBColor = RGBColor(0x60, 0x66, 0x6e);
-const GRID: RGBColor = RGBColor(0xd5, 0xd9, 0xde);
 const TOOTH: RGBColor = RGBColor(0x8f, 0xb3, 0xd9);
 const TIPS: RGBColor = RGBColor(0x1f, 0x4e, 0x79);
-
-type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
 /// A tooth: its foot on the curve, the outward normal there for a left turn, and the curvature, 1/mm.
 struct Tooth {
@@ -87,13 +80,8 @@ pub fn comb_picture(title: &str, before: &CubicSpline, after: Option<&CubicSplin
     let layout = Layout::new(&combs, after.is_some());
     let cut = combs.iter().flat_map(|c| &c.teeth).any(|tooth| tooth.curvature.abs() > longest * a_millimetre);
     let words = words(a_millimetre, longest, cut);
-    let mut svg = String::new();
     let size = (WIDTH as u32, layout.height() as u32);
-    layout
-        .draw(&SVGBackend::with_string(&mut svg, size).into_drawing_area(), title, &words, &combs)
-        .expect("drawing into a string cannot fail");
-    // Within a page the namespace is known, and its address would be the only one in it.
-    svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", " role=\"img\"", 1)
+    svg(size, |page| layout.draw(page, title, &words, &combs))
 }
 
 /// What a tooth's length says.
@@ -201,10 +189,14 @@ impl Layout {
         TITLE + self.rows as f64 * (NAME + self.height + X_MARKS) + WORDS
     }
 
-    fn draw<'a>(&self, page: &Page<'a>, title: &str, words: &str, combs: &[Comb]) -> Drawn<'a> {
+    fn draw(&self, page: &Page<'_>, title: &str, words: &str, combs: &[Comb]) -> Drawn {
         let below = self.height() as i32 - WORDS as i32 / 2;
         page.draw(&Text::new(title.to_owned(), (START, TITLE as i32 / 2), letters(26).pos(middle())))?;
-        page.draw(&Text::new(words.to_owned(), (START, below), letters(22).color(&FAINT).pos(middle())))?;
+        page.draw(&Text::new(
+            words.to_owned(),
+            (START, below),
+            letters(LETTERS).color(&FAINT).pos(middle()),
+        ))?;
         let (_, panels) = page.split_vertically(TITLE as u32);
         let (panels, _) = panels.split_vertically((self.height() - TITLE - WORDS) as u32);
         let panels = panels.split_evenly((self.rows, self.columns));
@@ -215,8 +207,8 @@ impl Layout {
         page.present()
     }
 
-    fn panel<'a>(&self, page: &Page<'a>, comb: &Comb, name: &str) -> Drawn<'a> {
-        page.draw(&Text::new(name.to_owned(), (START, NAME as i32 / 2), letters(22).pos(middle())))?;
+    fn panel(&self, page: &Page<'_>, comb: &Comb, name: &str) -> Drawn {
+        page.draw(&Text::new(name.to_owned(), (START, NAME as i32 / 2), letters(LETTERS).pos(middle())))?;
         let mut chart = ChartBuilder::on(page)
             .margin_top(NAME as u32)
             .margin_left(LEFT as u32)
@@ -232,7 +224,7 @@ impl Layout {
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(FAINT)
-            .label_style(letters(22))
+            .label_style(letters(LETTERS))
             .x_label_formatter(&|mm| plain(*mm, self.step))
             .y_label_formatter(&|mm| plain(*mm, self.step))
             .x_desc("x, mm")
@@ -279,11 +271,6 @@ impl Ranged for Axis {
 /// Left of a place, in the middle of its height.
 fn middle() -> Pos {
     Pos::new(HPos::Left, VPos::Center)
-}
-
-/// Letters of the page, which names the face.
-fn letters(size: i32) -> TextStyle<'static> {
-    ("sans-serif", size).into_font().color(&INK)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, Strokes, TextSize, distance_to_segment_2d};
 use super::map::{
-    Key, MapSize, MapWords, OFF_PART, Pooled, Pooling, diverging, draw, extremes, labelled, pool,
+    Key, MapSize, MapWords, Pooled, Pooling, diverging, draw, extremes, labelled, on_paper, pool,
 };
 use super::scale::Unit;
 use field::mesh::SingularPoint;
@@ -49,16 +49,15 @@ pub fn field_picture(
     size: MapSize,
 ) -> Picture {
     let map = pool(grid, deviation, Pooling::Mean, size);
-    let colour = |value: f32| if value.is_nan() { OFF_PART } else { PAPER };
-    let (mut page, legend) = draw(grid, &map, &colour, words, |page| {
-        let mut levels = strokes_over(&map);
+    let (mut page, legend) = draw(grid, &map, &on_paper, words, |page| {
+        let mut levels = map.strokes();
         for line in &field.level_lines {
             line.points
                 .windows(2)
                 .for_each(|w| levels.line(map.place(grid, w[0]), map.place(grid, w[1]), LEVEL_WIDTH));
         }
         page.ink(Pooled::CORNER, &levels, LEVEL);
-        let mut feeds = strokes_over(&map);
+        let mut feeds = map.strokes();
         strokes(grid, &map, field, &mut feeds);
         page.ink(Pooled::CORNER, &feeds, INK);
         // The strongest last, on top.
@@ -70,11 +69,6 @@ pub fn field_picture(
     });
     draw_legend(&mut page, legend, field.singular_points.len());
     page
-}
-
-/// No line yet over a whole map.
-fn strokes_over(map: &Pooled) -> Strokes {
-    Strokes::blank(map.width * map.magnify, map.height * map.magnify)
 }
 
 /// One stroke for each direction.
@@ -96,7 +90,7 @@ pub fn index_word(half_turns: i32) -> String {
 
 fn singular_point(page: &mut Picture, grid: &Grid, map: &Pooled, point: &SingularPoint, named: bool) {
     let [x, y] = map.place(grid, point.position.xy()).map(|c| c.floor() as i64);
-    let (width, height) = ((map.width * map.magnify) as i64, (map.height * map.magnify) as i64);
+    let [width, height] = map.size().map(|side| side as i64);
     if x < 0 || y < 0 || x >= width || y >= height {
         return;
     }
@@ -172,9 +166,8 @@ pub fn interval_picture(
         of: None,
     };
     let served = served(grid, &map, field);
-    let colour = |value: f32| if value.is_nan() { OFF_PART } else { PAPER };
-    let (mut page, at) = draw(grid, &map, &colour, words, |page| {
-        let (width, magnify) = (map.width * map.magnify, map.magnify);
+    let (mut page, at) = draw(grid, &map, &on_paper, words, |page| {
+        let (width, magnify) = (map.size()[0], map.magnify);
         for (k, nearest) in served.iter().enumerate() {
             let (x, y) = (k % width, k / width);
             let off = map.values[y / magnify * map.width + x / magnify].is_nan();
@@ -196,7 +189,7 @@ const NO_NEIGHBOUR: Rgb = [216, 218, 220];
 /// For each pixel of a map the pass point that serves it: squared distance (pixels) and ratio of intervals,
 /// NaN if unknown. A point serves half its interval, or half the allowed one.
 fn served(grid: &Grid, map: &Pooled, field: &PlannedField) -> Vec<Option<(f32, f32)>> {
-    let (width, height) = (map.width * map.magnify, map.height * map.magnify);
+    let [width, height] = map.size();
     let mut served: Vec<Option<(f32, f32)>> = vec![None; width * height];
     for pair in field.passes.iter().flat_map(|pass| pass.windows(2)) {
         let [a, b] = [map.place(grid, pair[0].at.xy()), map.place(grid, pair[1].at.xy())];
@@ -223,7 +216,7 @@ fn served(grid: &Grid, map: &Pooled, field: &PlannedField) -> Vec<Option<(f32, f
 /// The passes as thin lines where they are far enough apart to be told from each other.
 fn lines(page: &mut Picture, grid: &Grid, map: &Pooled, field: &PlannedField) {
     let apart = |p: &PassPoint| p.interval.unwrap_or(p.allowed) / map.pixel >= APART;
-    let mut strokes = strokes_over(map);
+    let mut strokes = map.strokes();
     for pair in field.passes.iter().flat_map(|pass| pass.windows(2)) {
         if apart(&pair[0]) {
             strokes.line(map.place(grid, pair[0].at.xy()), map.place(grid, pair[1].at.xy()), 0.0);
@@ -234,6 +227,7 @@ fn lines(page: &mut Picture, grid: &Grid, map: &Pooled, field: &PlannedField) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::map::OFF_PART;
     use super::*;
     use field::{FeedSample, LevelLine};
     use geometry::{Point2, Point3, Vector2};

@@ -1,10 +1,9 @@
 //! Distribution of scallop heights over ridge length, and its plot as SVG.
 
-use plotters::coord::Shift;
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::plot::{Drawn, FAINT, GRID, LETTERS, Page, letters, svg};
 use super::scale::{Unit, plain, round_up};
 use super::table::micrometres;
 
@@ -13,16 +12,10 @@ const SIZE: (u32, u32) = (1440, 560);
 /// Marks along the axis, at most. More run into each other.
 const TICKS: f64 = 10.0;
 
-const INK: RGBColor = RGBColor(0x20, 0x24, 0x2a);
-const FAINT: RGBColor = RGBColor(0x60, 0x66, 0x6e);
-const GRID: RGBColor = RGBColor(0xd5, 0xd9, 0xde);
 const BAR: RGBColor = RGBColor(0x8f, 0xb3, 0xd9);
 const SUM: RGBColor = RGBColor(0x1f, 0x4e, 0x79);
 const PASS: RGBColor = RGBColor(0x1b, 0x7f, 0x4b);
 const FAIL: RGBColor = RGBColor(0xb3, 0x26, 0x1e);
-
-type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
 /// Bins of the plot. More shows noise of the samples; fewer hides two kinds of ridges.
 const BINS: usize = 48;
@@ -66,14 +59,10 @@ impl Histogram {
 
     /// Bars of the shares, their running sum, and lines at target and limit, as an SVG element.
     pub fn svg(&self) -> String {
-        let mut svg = String::new();
-        self.draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area())
-            .expect("drawing into a string cannot fail");
-        // Within a page the namespace is known, and its address would be the only one in it.
-        svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", " role=\"img\"", 1)
+        svg(SIZE, |page| self.draw(page))
     }
 
-    fn draw(&self, page: &Page<'_>) -> Drawn<'_> {
+    fn draw(&self, page: &Page<'_>) -> Drawn {
         let end = self.bin * self.shares.len() as f64;
         let tallest = round_up(self.shares.iter().copied().fold(0.0, f64::max));
         let mut chart = ChartBuilder::on(page)
@@ -93,7 +82,7 @@ impl Histogram {
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(FAINT)
-            .label_style(letters())
+            .label_style(letters(LETTERS))
             .x_labels(TICKS as usize)
             .x_label_formatter(&|mm| unit.text(*mm, step))
             .y_label_formatter(&shares(tallest))
@@ -103,7 +92,7 @@ impl Histogram {
         chart
             .configure_secondary_axes()
             .axis_style(FAINT)
-            .label_style(letters())
+            .label_style(letters(LETTERS))
             .y_label_formatter(&shares(1.0))
             .y_desc("lower than this")
             .draw()?;
@@ -138,16 +127,11 @@ impl Histogram {
             let line = [(at, 0.0), (at, tallest)];
             chart.draw_series(DashedLineSeries::new(line, 10, 6, colour.stroke_width(3)))?;
             let (x, y) = chart.backend_coord(&(at, tallest));
-            let style = letters().color(&colour).pos(Pos::new(end, VPos::Bottom));
+            let style = letters(LETTERS).color(&colour).pos(Pos::new(end, VPos::Bottom));
             page.draw(&Text::new(words, (x, y - 6), style))?;
         }
         page.present()
     }
-}
-
-/// Letters as high as the page's small ones; the page names the face.
-fn letters() -> TextStyle<'static> {
-    ("sans-serif", 22).into_font().color(&INK)
 }
 
 #[cfg(test)]

@@ -48,14 +48,19 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
             pre { (scene) }
         }
     };
+    html_document(&report.title, STYLE, &body)
+}
+
+/// A page of its own, called `title`.
+pub fn html_document(title: &str, style: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (report.title) " - millstream" }
-                style { (PreEscaped(STYLE)) }
+                title { (title) " - millstream" }
+                style { (PreEscaped(style)) }
             }
             body { (body) }
         }

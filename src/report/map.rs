@@ -6,7 +6,7 @@
 use image::RgbImage;
 use image::imageops::{self, FilterType};
 
-use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, TextSize, shortened};
+use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, Strokes, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
 use geometry::{Point2, Vector2};
 use metrology::Limits;
@@ -19,6 +19,11 @@ const SHADES: usize = 151;
 const MAX_MAGNIFICATION: usize = 24;
 /// Colour of cells off the part; far from white, which is "no deviation".
 pub(super) const OFF_PART: Rgb = [176, 180, 184];
+
+/// A pixel of a map that shows nothing but where the part is.
+pub(super) fn on_paper(value: f32) -> Rgb {
+    if value.is_nan() { OFF_PART } else { PAPER }
+}
 
 /// Room around the map, pixels.
 const LEFT: usize = 92;
@@ -102,6 +107,17 @@ pub(super) struct Pooled {
 impl Pooled {
     /// The page's pixel at the map's upper left.
     pub const CORNER: [i64; 2] = [LEFT as i64, TOP as i64];
+
+    /// Width and height on the page, pixels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height].map(|cells| cells * self.magnify)
+    }
+
+    /// No line yet over all of it.
+    pub fn strokes(&self) -> Strokes {
+        let [width, height] = self.size();
+        Strokes::blank(width, height)
+    }
 
     /// Where a place of the plan view is on the map, pixels from its corner, y down.
     pub fn place(&self, grid: &Grid, at: Point2) -> [f64; 2] {
@@ -307,7 +323,7 @@ pub(super) fn draw(
     words: &MapWords<'_>,
     over: impl FnOnce(&mut Picture),
 ) -> (Picture, [i64; 2]) {
-    let (width, height) = (map.width * map.magnify, map.height * map.magnify);
+    let [width, height] = map.size();
     let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
     write_title(&mut page, words);
     let pixels = RgbImage::from_fn(map.width as u32, map.height as u32, |x, y| {
@@ -350,7 +366,7 @@ fn draw_marks(page: &mut Picture, grid: &Grid, map: &Pooled, marks: &[MapMark]) 
         page.ring(*x, *y, RING - 2, INK);
     }
     let width = |mark: &MapMark| (mark.name.chars().count() * TextSize::Small.letter_width()) as i64 + 4;
-    let [across, up] = [map.width, map.height].map(|cells| (cells * map.magnify) as i64);
+    let [across, up] = map.size().map(|side| side as i64);
     let within = Label { left: LEFT as i64, top: TOP as i64, width: across, height: up };
     for (mark, label) in marks.iter().zip(labels(&rings, marks.iter().map(width), within)) {
         page.fill(label.left, label.top, label.width, label.height, PAPER);
@@ -415,7 +431,7 @@ fn labels(rings: &[[i64; 2]], widths: impl Iterator<Item = i64>, map: Label) -> 
 
 /// Round positions in mm along the bottom and the left side.
 fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled, [right, up]: [&str; 2]) {
-    let (width, height) = ((map.width * map.magnify) as i64, (map.height * map.magnify) as i64);
+    let [width, height] = map.size().map(|side| side as i64);
     let (left, bottom) = (LEFT as i64, TOP as i64 + height);
     // Cells reach half a cell beyond their centres.
     let (x0, y0) = (grid.origin.x - 0.5 * grid.cell, grid.origin.y - 0.5 * grid.cell);
@@ -440,7 +456,7 @@ fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled, [right, up]: [&str; 
 
 /// A bar of a round length, about a fifth of the map.
 fn draw_bar(page: &mut Picture, map: &Pooled, height: usize) {
-    let width = (map.width * map.magnify) as f64 * map.pixel;
+    let width = map.size()[0] as f64 * map.pixel;
     let length = round_down(0.25 * width.max(0.5 * MIN_WIDTH as f64 * map.pixel));
     let pixels = (length / map.pixel).round().max(1.0) as i64;
     let (x, y) = (LEFT as i64, (TOP + height) as i64 + 52);

@@ -1,7 +1,7 @@
 //! The path over a map: cuts coloured in their order, links, moves off the surface, where it starts and ends.
 
-use super::canvas::{Align, INK, PAPER, Picture, Rgb, Strokes, TextSize};
-use super::map::{MapSize, MapWords, OFF_PART, Pooled, Pooling, draw, pool, sequential};
+use super::canvas::{Align, INK, PAPER, Picture, Rgb, TextSize};
+use super::map::{MapSize, MapWords, Pooled, Pooling, draw, on_paper, pool, sequential};
 use geometry::{Point2, Vector2};
 use motion::MoveKind;
 use sim::Grid;
@@ -50,14 +50,13 @@ pub fn path_picture(
 ) -> Picture {
     let (grid, values) = widened(grid, deviation, lines);
     let map = pool(&grid, &values, Pooling::Mean, size);
-    let colour = |value: f32| if value.is_nan() { OFF_PART } else { PAPER };
     let shades = shades(lines);
     let mut drawn = Drawn::default();
-    let (mut page, legend) = draw(&grid, &map, &colour, words, |page| {
-        let size = [map.width * map.magnify, map.height * map.magnify];
+    let (mut page, legend) = draw(&grid, &map, &on_paper, words, |page| {
+        let size = map.size();
         let mut ink = |colour: Rgb, width: f64, wanted: &dyn Fn(usize) -> bool| {
             let mut is_seen = false;
-            let mut strokes = Strokes::blank(map.width * map.magnify, map.height * map.magnify);
+            let mut strokes = map.strokes();
             for (_, line) in lines.iter().enumerate().filter(|(k, _)| wanted(*k)) {
                 let [a, b] = line.ends.map(|end| map.place(&grid, end));
                 strokes.line(a, b, width);
@@ -144,7 +143,7 @@ fn shade_colour(shade: usize) -> Rgb {
 
 /// A disc on the map; one outside of it is left out. Whether it is there.
 fn disc(page: &mut Picture, map: &Pooled, [x, y]: [f64; 2], colour: Rgb) -> bool {
-    let (width, height) = (map.width * map.magnify, map.height * map.magnify);
+    let [width, height] = map.size();
     let is_there = (0.0..=width as f64).contains(&x) && (0.0..=height as f64).contains(&y);
     if is_there {
         let at = [0, 1].map(|c| Pooled::CORNER[c] + [x, y][c] as i64);
@@ -183,6 +182,7 @@ fn draw_legend(page: &mut Picture, [x, y]: [i64; 2], drawn: &Drawn) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::map::OFF_PART;
     use super::*;
 
     const WORDS: MapWords<'_> = MapWords { title: "t", subtitle: "s", marks: &[], axes: ["x", "y"] };

@@ -52,6 +52,12 @@ pub fn with_bound(value: Option<f64>, error_bound: Option<f64>) -> String {
     }
 }
 
+/// A text with a capital letter at its beginning.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// Share as per cent, `-` for none.
 pub fn per_cent(share: Option<f64>) -> String {
     share.map_or("-".to_owned(), |share| plain(100.0 * share, 0.1))

@@ -3,12 +3,11 @@
 //! faster.
 
 use maud::{Markup, PreEscaped, html};
-use plotters::coord::Shift;
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::element::DynElement;
 use plotters::prelude::*;
 use serde_json::Value;
 
+use super::plot::{Drawn, FAINT, GRID, LETTERS, Page, letters, svg};
 use super::result::{RunReport, ToolpathResult};
 use super::scale::{Unit, plain, round_up};
 use super::table::{duration, micrometres};
@@ -25,10 +24,6 @@ const MARK: i32 = 8;
 /// Room on both sides of the times, as a share of the longest.
 const ROOM: f64 = 0.06;
 
-const INK: RGBColor = RGBColor(0x20, 0x24, 0x2a);
-const FAINT: RGBColor = RGBColor(0x60, 0x66, 0x6e);
-const GRID: RGBColor = RGBColor(0xd5, 0xd9, 0xde);
-
 /// Colours of toolpaths in turn, told apart by those who see few colours as well.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0x1f, 0x4e, 0x79),
@@ -42,9 +37,6 @@ const COLOURS: [RGBColor; 7] = [
 
 /// What is drawn of each toolpath.
 const HEIGHTS: [&str; 3] = ["highest", "p95", "Ra"];
-
-type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
 /// A toolpath that was planned for a time.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,22 +79,14 @@ pub(super) fn section(report: &RunReport) -> Markup {
                 } } }
             }
             figure {
-                (PreEscaped(svg(&timed)))
+                (PreEscaped(svg(SIZE, |page| draw(&timed, page))))
                 figcaption { "Measured heights over the machining time: highest ridge (rings), p95 of the ridges (dots) and roughness Ra across the feed (crosses). Lower is smoother, farther left is faster." }
             }
         }
     }
 }
 
-fn svg(timed: &[Timed<'_>]) -> String {
-    let mut svg = String::new();
-    draw(timed, &SVGBackend::with_string(&mut svg, SIZE).into_drawing_area())
-        .expect("drawing into a string cannot fail");
-    // Within a page the namespace is known, and its address would be the only one in it.
-    svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", " role=\"img\"", 1)
-}
-
-fn draw<'a>(timed: &[Timed<'_>], page: &Page<'a>) -> Drawn<'a> {
+fn draw(timed: &[Timed<'_>], page: &Page<'_>) -> Drawn {
     let times = || timed.iter().map(|t| t.minutes);
     let longest = times().fold(f64::MIN_POSITIVE, f64::max);
     let shortest = times().fold(longest, f64::min);
@@ -121,7 +105,7 @@ fn draw<'a>(timed: &[Timed<'_>], page: &Page<'a>) -> Drawn<'a> {
         .light_line_style(TRANSPARENT)
         .bold_line_style(GRID)
         .axis_style(FAINT)
-        .label_style(letters())
+        .label_style(letters(LETTERS))
         .x_labels(TICKS)
         .y_labels(TICKS)
         .x_label_formatter(&|minutes| plain(*minutes, steps[0]))
@@ -153,7 +137,7 @@ fn draw<'a>(timed: &[Timed<'_>], page: &Page<'a>) -> Drawn<'a> {
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperRight)
-        .label_font(letters())
+        .label_font(letters(LETTERS))
         .background_style(WHITE.mix(0.85))
         .border_style(GRID)
         .draw()?;
@@ -172,11 +156,6 @@ fn mark<'a>(
         1 => Circle::new(at, MARK, colour.filled()).into_dyn(),
         _ => Cross::new(at, MARK, colour.stroke_width(4)).into_dyn(),
     }
-}
-
-/// Letters as high as the page's small ones; the page names the face.
-fn letters() -> TextStyle<'static> {
-    ("sans-serif", 22).into_font().color(&INK)
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use std::fmt::{self, Write as _};
 
 use geometry::{Point3, Vector3};
-use keys::toml_number as number;
 use keys::{Located, SceneError, Section};
+use keys::{toml_number as number, toml_numbers as list};
 use motion::ToolAxis;
 
 /// The key of the axis of a toolpath.
@@ -71,7 +71,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneEr
         let message = "`axis` needs one rule for the tool axis, and only one";
         let cure = "write `{ lead = 15, tilt = 0 }`, `{ fixed = [0, 0.5, 1] }`, `{ toward = [[0, 0, 80]] }`, \
                     `{ away = [[0, 0, -80]] }` or `{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.3, 0, 1]] }`";
-        return Err(section.error(&section.key_span(KEY), message, cure));
+        return Err(section.key_error(KEY, message, cure));
     };
     Ok(Some(AxisRequest { rule, most_turning, most_turning_across }))
 }
@@ -123,8 +123,6 @@ pub(super) fn write(out: &mut String, request: Option<&AxisRequest>) -> fmt::Res
     let Some(AxisRequest { rule, most_turning, most_turning_across }) = request else {
         return writeln!(out, "axis = \"upright\"");
     };
-    let list =
-        |numbers: &[f64]| format!("[{}]", numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
     let lists = |rows: Vec<String>| format!("[{}]", rows.join(", "));
     let curve = |points: &[Point3]| lists(points.iter().map(|p| list(p.coords.as_slice())).collect());
     let rule = match rule {

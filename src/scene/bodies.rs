@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use super::kinematics::{FiveAxis, PLACE, place};
 use geometry::Point3;
 use keys::{LENGTH, SceneError, Section};
-use keys::{toml_number as number, toml_string as text};
+use keys::{toml_number as number, toml_numbers as list, toml_string as text};
 use machine::kinematics::{Chain, Link};
 
 /// The keys of `[machine]` that this module reads.
@@ -69,7 +69,7 @@ pub(super) fn read(
             Some(_) => ("belongs to the rotary axes", "move it into [machine.kinematics]"),
             None => ("does nothing without a body of the machine", "delete it, or add [[machine.body]]"),
         };
-        machine.error(&machine.key_span(key), format!("`{key}` of [machine] {message}"), cure)
+        machine.key_error(key, format!("`{key}` of [machine] {message}"), cure)
     };
     if let Some(key) =
         KEYS[1..].iter().find(|key| machine.has(key) && (five_axis.is_some() || sections.is_empty()))
@@ -135,11 +135,7 @@ fn read_body(section: &Section<'_>, five_axis: Option<&FiveAxis>) -> Result<Mach
     let shape = if shape == SHAPES[0] {
         if section.has("diameter") {
             let message = "a box has no `diameter`";
-            return Err(section.error(
-                &section.key_span("diameter"),
-                message,
-                "delete it, or write `shape = \"cylinder\"`",
-            ));
+            return Err(section.key_error("diameter", message, "delete it, or write `shape = \"cylinder\"`"));
         }
         if way.iter().any(|side| side.abs() < *LENGTH.start()) {
             return Err(no_volume("the corners share a coordinate"));
@@ -159,17 +155,13 @@ fn read_body(section: &Section<'_>, five_axis: Option<&FiveAxis>) -> Result<Mach
 pub(super) fn write_places(out: &mut String, scene: &super::Scene) -> fmt::Result {
     let Some(made) = scene.bodies.as_ref().filter(|_| scene.five_axis.is_none()) else { return Ok(()) };
     writeln!(out, "gauge_length = {}  # mm, spindle nose to tip", number(-made.chain.tip().z))?;
-    let [x, y, z] = <[f64; 3]>::from(made.chain.workpiece_zero().coords).map(number);
-    writeln!(out, "workpiece_zero = [{x}, {y}, {z}]  # mm, in machine coordinates")
+    let zero = list(made.chain.workpiece_zero().coords.as_slice());
+    writeln!(out, "workpiece_zero = {zero}  # mm, in machine coordinates")
 }
 
 /// Writes the bodies, behind all other keys of `[machine]`.
 pub(super) fn write(out: &mut String, scene: &super::Scene) -> fmt::Result {
     let links = links(scene.five_axis.as_ref());
-    let list = |at: &Point3| {
-        let [x, y, z] = <[f64; 3]>::from(at.coords).map(number);
-        format!("[{x}, {y}, {z}]")
-    };
     for body in scene.bodies.iter().flat_map(|made| &made.bodies) {
         let on = links.iter().find(|(_, link)| *link == body.link).map_or(FRAME, |(word, _)| *word);
         writeln!(out, "\n[[machine.body]]  # mm")?;
@@ -183,8 +175,8 @@ pub(super) fn write(out: &mut String, scene: &super::Scene) -> fmt::Result {
         if let BodyShape::Cylinder { diameter, .. } = body.shape {
             writeln!(out, "diameter = {}", number(diameter))?;
         }
-        writeln!(out, "from = {}", list(from))?;
-        writeln!(out, "to = {}", list(to))?;
+        writeln!(out, "from = {}", list(from.coords.as_slice()))?;
+        writeln!(out, "to = {}", list(to.coords.as_slice()))?;
     }
     Ok(())
 }

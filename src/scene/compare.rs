@@ -7,7 +7,7 @@
 
 use std::fmt::{self, Write as _};
 
-use keys::{SceneError, Section, toml_number as number};
+use keys::{SceneError, Section, toml_numbers};
 use toolpath::PartKind;
 
 use super::ToolpathRequest;
@@ -40,8 +40,7 @@ pub(super) fn read(root: &Section<'_>) -> Result<Vec<f64>, SceneError> {
     } else {
         vec![section.required_number("minutes", MINUTES, " minutes", 2.5)?.value]
     };
-    let refuse =
-        |what: String, cure: &str| Err(section.error(&section.key_span("minutes"), what, cure.to_owned()));
+    let refuse = |what: String, cure: &str| Err(section.key_error("minutes", what, cure.to_owned()));
     let twice = minutes.iter().enumerate().find(|(k, time)| minutes[..*k].contains(time));
     match (minutes.len(), twice) {
         (_, Some((_, time))) => refuse(format!("`minutes` has {time} twice"), "delete one of them"),
@@ -63,7 +62,7 @@ pub(super) fn at_times(
         return Ok(vec![request]);
     }
     let refused = |key: &str, what: String, cure: &str| {
-        section.error(&section.key_span(key), what, format!("{cure}, or delete [compare]"))
+        section.key_error(key, what, format!("{cure}, or delete [compare]"))
     };
     if request.strategy.definition().part != PartKind::Surface {
         let what = format!(
@@ -95,10 +94,9 @@ pub(super) fn at_times(
 pub(super) fn write(out: &mut String, toolpaths: &[ToolpathRequest]) -> fmt::Result {
     let times = || toolpaths.iter().filter_map(|request| request.equal_time.as_ref());
     let Some(first) = times().next() else { return Ok(()) };
-    let minutes: Vec<String> =
-        times().filter(|time| time.of == first.of).map(|time| number(time.minutes)).collect();
+    let minutes: Vec<f64> = times().filter(|time| time.of == first.of).map(|time| time.minutes).collect();
     writeln!(out, "\n[compare]")?;
-    writeln!(out, "minutes = [{}]  # machining times that each toolpath is planned for", minutes.join(", "))
+    writeln!(out, "minutes = {}  # machining times that each toolpath is planned for", toml_numbers(&minutes))
 }
 
 /// Whether a toolpath is the first of those that one table of the scene made.

@@ -33,18 +33,15 @@ pub struct KeepClear {
 pub(super) fn read(root: &Section<'_>, folder: &Path) -> Result<KeepClear, SceneError> {
     let section = root.section("interference")?;
     section.only(&["clearance", "tilt", "lift"], &[], "[interference]")?;
-    let number = |key, range, unit, default: f64| {
-        Ok::<f64, SceneError>(section.number(key, range, unit)?.map_or(default, |v| v.value))
-    };
     let length = 0.0..=*LENGTH.end();
     let fixture = |section: &Section<'_>| {
         section.only(&["file", "unit"], &[], "a fixture")?;
         MeshFile::of_table(section, folder, "vise.stl")
     };
     Ok(KeepClear {
-        clearance: number("clearance", length.clone(), " mm", DEFAULT_CLEARANCE)?,
-        greatest_tilt: number("tilt", 0.0..=80.0, " degrees", DEFAULT_TILT)?.to_radians(),
-        greatest_lift: number("lift", length, " mm", 0.0)?,
+        clearance: section.number_or("clearance", length.clone(), " mm", DEFAULT_CLEARANCE)?,
+        greatest_tilt: section.number_or("tilt", 0.0..=80.0, " degrees", DEFAULT_TILT)?.to_radians(),
+        greatest_lift: section.number_or("lift", length, " mm", 0.0)?,
         fixtures: root.sections("fixture")?.iter().map(fixture).collect::<Result<_, SceneError>>()?,
     })
 }

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use geometry::{Point3, Vector3};
 use io::gcode::{Style, TCP_WORDS};
 use keys::{Located, SceneError, Section};
-use keys::{toml_number as number, toml_string as text};
+use keys::{toml_number as number, toml_numbers as list, toml_string as text};
 use machine::Machine;
 use machine::kinematics::{
     DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError,
@@ -136,7 +136,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
         let asked = |missing: bool, key: &str, example: &str, why: &str| {
             let message = format!("`post = \"full\"` needs `{key}`: {why}");
             if missing {
-                Err(table.error(&table.key_span("post"), message, format!("add `{key} = {example}`")))
+                Err(table.key_error("post", message, format!("add `{key} = {example}`")))
             } else {
                 Ok(())
             }
@@ -211,7 +211,7 @@ pub(super) fn known_height(machine: &Section<'_>, five_axis: Option<&FiveAxis>) 
         Some(_) => format!("add `{key} = {example}`"),
         None => "write it as a table: `kinematics = { preset = \"ac-table\", gauge_length = 150.0, workpiece_zero = [0.0, 0.0, -300.0] }`".to_owned(),
     };
-    Err(machine.error(&machine.key_span(KEY), message, cure))
+    Err(machine.key_error(KEY, message, cure))
 }
 
 /// A refusal of the machine at the axis that it is about.
@@ -225,7 +225,7 @@ fn refused(table: &Section<'_>, first: char, error: &KinematicsError) -> SceneEr
         | KinematicsError::AlongSpindle { .. }
         | KinematicsError::Number { .. } => "second",
     };
-    table.error(&table.key_span(key), error.to_string(), error.cure())
+    table.key_error(key, error.to_string(), error.cure())
 }
 
 /// An axis, completed from that of the preset.
@@ -234,8 +234,8 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
     let Some(section) = table.inline(key) else {
         return match named {
             Some(axis) if !table.has(key) => Ok(axis),
-            _ => Err(table.error(
-                &table.key_span(key),
+            _ => Err(table.key_error(
+                key,
                 format!("`kinematics` needs `{key}` as a table, or a `preset`"),
                 format!("write `{key} = {example}`, or `preset = \"ac-table\"`"),
             )),
@@ -351,8 +351,6 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
             writeln!(out, "{key} = {}", text(words))?;
         }
     }
-    let list =
-        |numbers: &[f64]| format!("[{}]", numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
     for (key, (axis, direction)) in
         ["first", "second"].into_iter().zip(kinematics.axes().iter().zip(directions))
     {

@@ -111,11 +111,7 @@ impl Scene {
         let minutes = compare::read(&root)?;
         if !minutes.is_empty() && section.has("correct") {
             let message = "`correct` does not apply where [compare] plans for a machining time";
-            return Err(section.error(
-                &section.key_span("correct"),
-                message,
-                "delete it, or delete [compare]",
-            ));
+            return Err(section.key_error("correct", message, "delete it, or delete [compare]"));
         }
         let simulation = read_simulation(&root.section("simulation")?, &tolerance)?;
         let section = root.section("machine")?;
@@ -125,7 +121,7 @@ impl Scene {
         let arcs = read_arcs(&section, five_axis.is_some(), &tolerance)?;
         if five_axis.is_some() && section.has("blending") {
             let message = "`blending` does not apply to machines with rotary axes";
-            return Err(section.error(&section.key_span("blending"), message, "delete it"));
+            return Err(section.key_error("blending", message, "delete it"));
         }
         let bodies = bodies::read(&section, five_axis.as_ref())?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &tooling, &minutes)?;
@@ -207,16 +203,15 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
     const KEYS: [&str; 8] =
         ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "direction", "correct"];
     section.only(&KEYS, &[], "[tolerance]")?;
-    let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
-    let scallop = length("scallop", DEFAULT_LIMITS.scallop)?;
+    let scallop = section.length_or("scallop", DEFAULT_LIMITS.scallop)?;
     let highest = read_scallop_rule(section)?.highest * scallop;
     Ok(Limits {
         scallop,
-        gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
+        gouge: section.length_or("gouge", DEFAULT_LIMITS.gouge)?,
         // What ridges may be, other material may be as well where nothing is said of it.
-        uncut: length("uncut", DEFAULT_LIMITS.uncut.max(highest))?,
+        uncut: section.length_or("uncut", DEFAULT_LIMITS.uncut.max(highest))?,
         // A tenth of the ridges at most: what chords leave or cut stands beside them.
-        chord: length("chord", DEFAULT_LIMITS.chord.min(CHORD_SHARE * scallop))?,
+        chord: section.length_or("chord", DEFAULT_LIMITS.chord.min(CHORD_SHARE * scallop))?,
     })
 }
 
@@ -232,11 +227,9 @@ const GREATEST_FACTOR: f64 = 100.0;
 
 fn read_scallop_rule(section: &Section<'_>) -> Result<ScallopRule, SceneError> {
     let strict = ScallopRule::default();
-    let share = section.number("scallop_share", LEAST_SHARE..=1.0, "")?;
-    let highest = section.number("scallop_highest", 1.0..=GREATEST_FACTOR, "")?;
     Ok(ScallopRule {
-        share: share.map_or(strict.share, |v| v.value),
-        highest: highest.map_or(strict.highest, |v| v.value),
+        share: section.number_or("scallop_share", LEAST_SHARE..=1.0, "", strict.share)?,
+        highest: section.number_or("scallop_highest", 1.0..=GREATEST_FACTOR, "", strict.highest)?,
     })
 }
 
@@ -292,7 +285,7 @@ fn read_arcs(section: &Section<'_>, five_axis: bool, tolerance: &Limits) -> Resu
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
     if let Some(key) = SPEEDS.into_iter().find(|key| section.has(key)) {
         let message = format!("the key `{key}` does not apply to [machine]");
-        return Err(section.error(&section.key_span(key), message, format!("write `{key}` in [cutter]")));
+        return Err(section.key_error(key, message, format!("write `{key}` in [cutter]")));
     }
     let bodies = bodies::KEYS;
     section.only(
@@ -318,26 +311,21 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
         "[machine]",
     )?;
     let default = Machine::default();
-    let number =
-        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let rate = |key, default| section.number_or(key, RATE, "", default);
     let blending = section.choice("blending", &BLENDINGS)?;
     let machine = Machine {
-        rapid_rate: number("rapid_rate", default.rapid_rate)?,
-        acceleration: number("acceleration", default.acceleration)?,
-        junction_deviation: section
-            .length("junction_deviation")?
-            .map_or(default.junction_deviation, |v| v.value),
-        jerk: section.number("jerk", JERK, " mm/s3")?.map_or(default.jerk, |v| v.value),
-        block_rate: section
-            .number("block_rate", BLOCK_RATE, " lines/s")?
-            .map_or(default.block_rate, |v| v.value),
+        rapid_rate: rate("rapid_rate", default.rapid_rate)?,
+        acceleration: rate("acceleration", default.acceleration)?,
+        junction_deviation: section.length_or("junction_deviation", default.junction_deviation)?,
+        jerk: section.number_or("jerk", JERK, " mm/s3", default.jerk)?,
+        block_rate: section.number_or("block_rate", BLOCK_RATE, " lines/s", default.block_rate)?,
         rates: kinematics::rates(section)?.unwrap_or(default.rates),
         accelerations: kinematics::accelerations(section)?.unwrap_or(default.accelerations),
         jerks: kinematics::jerks(section)?.unwrap_or(default.jerks),
         blending,
         slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
-    Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))
+    Ok((machine, section.length_or("clearance", DEFAULT_CLEARANCE)?))
 }
 
 fn read_toolpaths(
@@ -350,8 +338,8 @@ fn read_toolpaths(
 ) -> Result<Vec<ToolpathRequest>, SceneError> {
     let sections = root.sections("toolpath")?;
     if sections.is_empty() {
-        return Err(root.error(
-            &root.key_span("toolpath"),
+        return Err(root.key_error(
+            "toolpath",
             "the scene has no toolpath",
             "add a table [[toolpath]] with `strategy = \"zigzag\"`",
         ));
@@ -489,7 +477,7 @@ fn read_slope(section: &Section<'_>, tilts: bool) -> Result<[f64; 2], SceneError
     let slope = section.interval(SLOPE, ALL_SLOPES[0]..=ALL_SLOPES[1], " degrees")?.unwrap_or(ALL_SLOPES);
     if tilts && slope != ALL_SLOPES {
         let cure = "delete one of the two: a tool that leans goes over all that its strategy covers";
-        return Err(section.error(&section.key_span(SLOPE), "`slope` does not apply beside `axis`", cure));
+        return Err(section.key_error(SLOPE, "`slope` does not apply beside `axis`", cure));
     }
     Ok(slope)
 }
@@ -508,7 +496,7 @@ fn read_boundary(section: &Section<'_>, tilts: bool) -> Result<Option<Arc<Region
         let cure = format!(
             "write closed curves that neither cross nor touch: `{BOUNDARY} = [[[0, 0], [40, 0], [40, 30]]]`"
         );
-        section.error(&section.key_span(BOUNDARY), format!("`{BOUNDARY}`: {error}"), cure)
+        section.key_error(BOUNDARY, format!("`{BOUNDARY}`: {error}"), cure)
     })?;
     Ok(Some(Arc::new(region.0)))
 }
@@ -523,14 +511,14 @@ fn read_rest(section: &Section<'_>, tilts: bool) -> Result<bool, SceneError> {
         let message = format!("`{REST}` in a toolpath that cuts a block of its own");
         let cure =
             format!("add `stock = \"{PREVIOUS_STOCK}\"`: the rest is what the toolpaths before it left");
-        return Err(section.error(&section.key_span(REST), message, cure));
+        return Err(section.key_error(REST, message, cure));
     }
     Ok(rest)
 }
 
 fn beside_axis(section: &Section<'_>, key: &str) -> SceneError {
     let message = format!("`{key}` does not apply beside `axis`");
-    section.error(&section.key_span(key), message, "delete one of the two")
+    section.key_error(key, message, "delete one of the two")
 }
 
 /// How deep each level of a toolpath goes below the one above, and what it leaves on the part, mm.
@@ -552,14 +540,14 @@ fn read_roughing(
         let message =
             format!("`{STEPDOWN}` does not apply to strategy = \"{}\" as it is here", strategy.word());
         let cure = "rough by `zigzag` or a plain `spiral`: between other passes, held up at a level, stock may stand";
-        return Err(section.error(&section.key_span(STEPDOWN), message, cure));
+        return Err(section.key_error(STEPDOWN, message, cure));
     }
     // Ridges over what is left on the part are none of the part's.
     if allowance.is_some_and(|allowance| allowance > 0.0) && !section.has("stepover") {
         let message =
             format!("a toolpath with an `{ALLOWANCE}` is planned by a `stepover`, and none is given");
         let cure = "add `stepover`: no scallop height is judged of what another toolpath cuts off";
-        return Err(section.error(&section.key_span(ALLOWANCE), message, cure));
+        return Err(section.key_error(ALLOWANCE, message, cure));
     }
     Ok(found)
 }
@@ -576,7 +564,7 @@ fn check_allowances(toolpaths: &[(&Section<'_>, ToolpathRequest)]) -> Result<(),
     );
     let cure =
         format!("add a [[toolpath]] with `stock = \"{PREVIOUS_STOCK}\"` behind it, or delete `{ALLOWANCE}`");
-    Err(section.error(&section.key_span(ALLOWANCE), message, cure))
+    Err(section.key_error(ALLOWANCE, message, cure))
 }
 
 /// How passes are smoothed and joined, in the usual way where nothing is said.
@@ -589,8 +577,8 @@ fn read_joining(section: &Section<'_>, usual: Links) -> Result<Joining, SceneErr
     };
     let longest_link = section.length_or_word("longest_link", "auto")?;
     if links == Links::Retract && longest_link.is_some() {
-        return Err(section.error(
-            &section.key_span("longest_link"),
+        return Err(section.key_error(
+            "longest_link",
             "`longest_link` does not apply to links = \"retract\"",
             "delete one of the two",
         ));
@@ -616,7 +604,7 @@ fn check_pocket_strategies(
         PartKind::Pocket => format!("use one of {}", words_for(kind)),
         _ => format!("use one of {}, or `surface = \"pocket\"` in [part]", words_for(kind)),
     };
-    Err(root.error(&root.key_span("toolpath"), message, cure))
+    Err(root.key_error("toolpath", message, cure))
 }
 
 /// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cutter::Cutter;
 use geometry::{Aabb, Point3};
-use keys::{LENGTH, SceneError, Section, toml_number as number};
+use keys::{LENGTH, SceneError, Section, toml_number as number, toml_numbers};
 use sim::BarAxis;
 
 use super::part::{MeshFile, PartSource};
@@ -102,14 +102,14 @@ pub(super) fn read(
 
 fn around(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<StockRequest, SceneError> {
     // Zero is meant in both: stock may end at the part's top and at its rim.
-    let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
+    let length = |key, default| stock.number_or(key, 0.0..=*LENGTH.end(), " mm", default);
     // A pocket is milled into a finished face, and what is cut beside it has to be seen.
     let pocket = matches!(part, PartSource::Pocket { .. });
     let (top, around) = if pocket { (0.0, cutter.radius()) } else { (DEFAULT_ALLOWANCE, DEFAULT_MARGIN) };
     Ok(StockRequest::Around {
-        allowance: length("allowance")?.map_or(top, |v| v.value),
-        margin: length("margin")?.map_or(around, |v| v.value),
-        roughed: length("roughed")?.map(|v| v.value),
+        allowance: length("allowance", top)?,
+        margin: length("margin", around)?,
+        roughed: stock.number("roughed", 0.0..=*LENGTH.end(), " mm")?.map(|v| v.value),
     })
 }
 
@@ -131,11 +131,7 @@ fn block(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
 fn bar(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
     let from = stock.vector("from")?.ok_or_else(|| {
         let message = "the bar begins nowhere";
-        stock.error(
-            &stock.key_span("diameter"),
-            message,
-            "add `from = [0, 0, 0]`: the middle of one of its ends",
-        )
+        stock.key_error("diameter", message, "add `from = [0, 0, 0]`: the middle of one of its ends")
     })?;
     Ok(StockRequest::Bar {
         from: from.value.into(),
@@ -147,7 +143,7 @@ fn bar(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
 
 /// Writes `[stock]` as scenes spell it. A margin that nobody stated stays one.
 pub(super) fn write(out: &mut String, stock: &StockRequest, is_stated: bool) -> fmt::Result {
-    let list = |p: &Point3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
+    let list = |p: &Point3| toml_numbers(p.coords.as_slice());
     writeln!(out, "\n[stock]")?;
     match stock {
         StockRequest::Around { allowance, margin, roughed } => {

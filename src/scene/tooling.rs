@@ -43,8 +43,7 @@ pub struct Tooling {
 pub(super) fn read(table: &Section<'_>) -> Result<Tooling, SceneError> {
     let section = table.section(CUTTER)?;
     let cutter = Cutter::read(&section, &SPEEDS)?;
-    let rate =
-        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let rate = |key, default| section.number_or(key, RATE, "", default);
     let cutting = CuttingData {
         spindle_speed: rate("spindle_speed", DEFAULT_SPINDLE_SPEED)?,
         feed_rate: rate("feed_rate", DEFAULT_FEED_RATE)?,
@@ -60,14 +59,14 @@ pub(super) fn read_own(toolpath: &Section<'_>, of_scene: &Tooling) -> Result<Too
             let message = "`holder` in a toolpath without `cutter`";
             let cure =
                 "write the holder of the scene's cutter as [holder], or give the toolpath its own cutter";
-            return Err(toolpath.error(&toolpath.key_span(HOLDER), message, cure));
+            return Err(toolpath.key_error(HOLDER, message, cure));
         }
         return Ok(of_scene.clone());
     }
     if of_scene.holder.is_some() && !toolpath.has(HOLDER) {
         let message = "the scene's cutter has a holder and this one has none: it would go unchecked";
         let cure = "add `[toolpath.holder]` with its `cutting_length` and `[[toolpath.holder.section]]`";
-        return Err(toolpath.error(&toolpath.key_span(CUTTER), message, cure));
+        return Err(toolpath.key_error(CUTTER, message, cure));
     }
     read(toolpath)
 }
@@ -108,7 +107,7 @@ pub(super) fn check_rates(
         let cure = format!(
             "write `{key} = {rapid_rate}` in {place} or less, or a greater `rapid_rate` in [machine]"
         );
-        return Err(section.error(&section.key_span(stated), message, cure));
+        return Err(section.key_error(stated, message, cure));
     }
     Ok(())
 }
@@ -138,20 +137,7 @@ fn read_holder(table: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, S
         }
         (Some(length), _) => length.value,
     };
-    let sections: Vec<HolderSection> = holder
-        .sections("section")?
-        .iter()
-        .map(|section| {
-            section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
-            let diameter = section.required_length("diameter", 32.0)?.value;
-            let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
-            Ok(HolderSection {
-                diameter,
-                top_diameter,
-                length: section.required_length("length", 40.0)?.value,
-            })
-        })
-        .collect::<Result<_, SceneError>>()?;
+    let sections = holder.sections("section")?.iter().map(HolderSection::read).collect::<Result<_, _>>()?;
     Holder::new(length, sections).map(Some).map_err(|e| {
         holder.error(
             holder.header(),

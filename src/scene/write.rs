@@ -6,8 +6,7 @@ use super::read::{ALLOWANCE, BLENDINGS, BOUNDARY, PREVIOUS_STOCK, REST, SLOPE, S
 use super::{
     Scene, Simulation, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock,
 };
-use geometry::Point2;
-use keys::{toml_number as number, toml_string as text, word_of};
+use keys::{toml_number as number, toml_points, toml_string as text, word_of};
 use toolpath::{Links, PartKind, Step, longest_link};
 
 /// The whole scene as TOML, every default in effect included. Reading it gives the same scene
@@ -134,9 +133,7 @@ fn write_toolpath(out: &mut String, request: &ToolpathRequest, scene: &Scene) ->
         writeln!(out, "{ALLOWANCE} = {}  # mm left on the part", number(request.allowance))?;
     }
     if let Some(boundary) = &request.boundary {
-        let point = |p: &Point2| format!("[{}, {}]", number(p.x), number(p.y));
-        let curve = |c: &[Point2]| format!("[{}]", c.iter().map(point).collect::<Vec<_>>().join(", "));
-        let curves: Vec<String> = boundary.curves().map(curve).collect();
+        let curves: Vec<String> = boundary.curves().map(toml_points).collect();
         writeln!(out, "{BOUNDARY} = [{}]  # mm, of the tool axis", curves.join(", "))?;
     }
     if request.rest {

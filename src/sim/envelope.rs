@@ -8,6 +8,13 @@ use motion::{Cutters, Toolpath};
 use work::parallel;
 
 /// All moves of a path, ready to be evaluated one by one: 64 bytes a move. mm.
+///
+/// # Tolerance
+/// Ball and flat end: closed form. Bull nose and taper: closed form on disc and cone; on the arc
+/// (a torus) a safeguarded Newton iteration to the last bits of f64. The result is that of a
+/// distance from the axis that is wrong by a few units in the last place: below 1e-12 mm where the
+/// profile is gentle, up to 1e-7 mm at the very rim, where any profile with a corner radius is
+/// vertical and the distance itself is not known better.
 #[derive(Debug, Clone)]
 pub struct Envelope {
     /// The first moves of the cutters, and their profiles.
@@ -36,9 +43,6 @@ impl Envelope {
     /// The lowest cut at `(x, y)` among the moves `candidates` (indices into the path's moves) and
     /// the move that makes it, the least index of equals; `None` where none of them passes. The
     /// order of the candidates is of no account.
-    ///
-    /// # Tolerance
-    /// As [`SweptMove`](super::SweptMove).
     pub fn lowest(&self, x: f64, y: f64, candidates: &[u32]) -> Option<(f64, u32)> {
         match &self.forms[..] {
             [(_, form)] if form.family == Family::Ball => self.lowest_by(candidates, |_, track| {
@@ -68,12 +72,7 @@ impl Envelope {
         (height < f64::INFINITY).then_some(height)
     }
 
-    /// Unit normal (up) of the cut of move `index` at `(x, y)`; `None` where it does not pass.
-    pub fn normal(&self, index: u32, x: f64, y: f64) -> Option<Vector3> {
-        self.height_and_normal(index, x, y).map(|(_, normal)| normal)
-    }
-
-    /// [`Envelope::height`] and [`Envelope::normal`] at once.
+    /// As [`Envelope::height`], with the unit normal (up) of the cut.
     pub fn height_and_normal(&self, index: u32, x: f64, y: f64) -> Option<(f64, Vector3)> {
         swept_height_and_normal(self.form(index), &self.tracks[index as usize], x, y)
     }
@@ -82,8 +81,8 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SweptMove;
     use crate::scenes::{Rng, cutters, random_path};
+    use crate::swept::tests::SweptMove;
     use cutter::Cutter;
     use geometry::Point3;
 

@@ -8,7 +8,7 @@
 //! program. Over the cells of a tile stands a tree with sixteen children a node (`tile`), each with a plane
 //! above all heights below it; a move descends only where a plane below its own cut reaches beneath that
 //! plane (`bound`). It cuts leaves of 8 × 8 cells (`leaf`), whose heights come from the vector loops of the
-//! engine without order, and from the closed forms of [`SweptMove`](super::SweptMove) where those leave a
+//! engine without order, and from the closed forms of [`Envelope`](super::Envelope) where those leave a
 //! doubt (`heights`).
 //!
 //! A move leaves out the places that it cuts from its very start, since the move before cut them. A torus is

@@ -27,7 +27,6 @@ use geometry::{Node, Point3, Vector3};
 use lowest::{Ray, Support};
 use motion::{Move, MoveKind, PathError, Toolpath};
 use work::monitor::{Cancelled, Monitor, check};
-use work::parallel;
 
 /// Moves that reach equally low within this, mm, are equal: the end of one move and the begin of the next
 /// are the same tool, but for rounding.
@@ -40,10 +39,6 @@ const BEFORE: f64 = 1e-6;
 /// How far around the nearest time its closer value is looked for, and how often what is left is halved.
 const AROUND: f64 = 1e-3;
 const HALVINGS: usize = 40;
-
-/// Rays that one worker takes at a time, and between two questions whether to go on. Each begins with the
-/// move that was found by the one before, which more of them in a row gain from; fewer leave no worker idle.
-const CHUNK: usize = 512;
 
 /// Where a ray meets the swept volume lowest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -188,36 +183,6 @@ impl Rays {
             *(if look(middle).sample.slope < 0.0 { &mut early } else { &mut late }) = middle;
         }
         (-look(0.5 * (early + late)).gradient).try_normalize(0.5)
-    }
-
-    /// As [`Rays::deviation`] for many places at once, on all threads; the same bits for any number of them.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the monitor says so.
-    pub fn deviations(
-        &self,
-        points: &[Point3],
-        normals: &[Vector3],
-        inward: f64,
-        outward: f64,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<Option<RayHit>>, Cancelled> {
-        let count = points.len().min(normals.len());
-        monitor.start("rays", count as u64);
-        let chunks = parallel::try_map(count.div_ceil(CHUNK), |k| {
-            check(monitor)?;
-            let range = k * CHUNK..((k + 1) * CHUNK).min(count);
-            let mut seed = None;
-            let of_one = |i: usize| {
-                let found = self.lowest(&points[i], &normals[i], [-inward, outward], seed);
-                seed = found.map(|(_, slot)| slot).or(seed);
-                found.map(|(hit, _)| hit)
-            };
-            let hits: Vec<Option<RayHit>> = range.clone().map(of_one).collect();
-            monitor.advance(range.len() as u64);
-            Ok(hits)
-        })?;
-        Ok(chunks.into_iter().flatten().collect())
     }
 
     /// The lowest hit and the slot of the tree in which it was found, beginning with what stands in the

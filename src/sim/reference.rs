@@ -48,7 +48,7 @@ const STOCK: f64 = -1.0;
 /// says so.
 ///
 /// # Tolerance
-/// Moves are evaluated and compared in f64 (see [`SweptMove`](super::SweptMove)) at the cell centres; storing
+/// Moves are evaluated and compared in f64 (see [`Envelope`](super::Envelope)) at the cell centres; storing
 /// the height as f32 adds at most half a unit in its last place: 0.004 µm below 128 mm, 0.03 µm below 1 m.
 /// The bits do not depend on the number of threads.
 pub fn cut_reference(

@@ -21,7 +21,6 @@ mod turning;
 
 use cutter::Solid;
 use geometry::Point3;
-use motion::ClPoint;
 pub(crate) use moves::MovePart;
 pub use moves::{SweptHit, SweptMoves};
 use search::least;
@@ -32,57 +31,17 @@ pub use turning::Motion;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("move {index} turns the tool axis around to its opposite: which way is not told")]
 pub struct OppositeAxes {
-    /// Index of the move; 0 where it is asked for alone.
+    /// Index of the move.
     pub index: usize,
 }
 
 /// How near a tool comes on one move.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nearest {
+pub(crate) struct Nearest {
     /// Signed distance, mm; negative where the tool passes over the place.
     pub distance: f64,
     /// When, from 0 at the begin of the move to 1 at its end.
     pub t: f64,
-}
-
-/// The volume that a solid sweeps on one move.
-///
-/// # Tolerance
-/// Distances are least over the time of the move to 1e-9 mm. Inside of a solid of several pieces it is
-/// the depth at the time at which one piece is deepest around the place, which another time may exceed;
-/// its sign, and all distances outside, are exact.
-#[derive(Debug, Clone, Copy)]
-pub struct SweptSolid<'a> {
-    solid: &'a Solid,
-    motion: Motion,
-}
-
-impl<'a> SweptSolid<'a> {
-    /// Prepares a move, of any length and turn; also of none.
-    ///
-    /// # Errors
-    /// [`OppositeAxes`] when the two axes are opposite within a millionth of a radian.
-    pub fn new(solid: &'a Solid, from: &ClPoint, to: &ClPoint) -> Result<Self, OppositeAxes> {
-        let motion = Motion::new(from, to).ok_or(OppositeAxes { index: 0 })?;
-        Ok(Self { solid, motion })
-    }
-
-    /// Signed distance of `q` from the swept volume: the least over the move.
-    pub fn distance(&self, q: &Point3) -> Nearest {
-        let begin = Nearest { distance: self.at(q, 0.0), t: 0.0 };
-        self.below(q, begin.distance).unwrap_or(begin)
-    }
-
-    /// As [`SweptSolid::distance`] where that is less than `limit`; else `None`, mostly at the cost of one
-    /// look at the middle of the move.
-    pub fn below(&self, q: &Point3, limit: f64) -> Option<Nearest> {
-        below(self.solid, &self.motion, q, [0.0, 1.0], limit)
-    }
-
-    /// Signed distance from the solid as it stands at time `t`.
-    pub fn at(&self, q: &Point3, t: f64) -> f64 {
-        distance_at(self.solid, &self.motion, q, t)
-    }
 }
 
 fn distance_at(solid: &Solid, motion: &Motion, q: &Point3, t: f64) -> f64 {
@@ -91,6 +50,9 @@ fn distance_at(solid: &Solid, motion: &Motion, q: &Point3, t: f64) -> f64 {
 }
 
 /// The least distance within a stretch of a move, if it is below `limit`.
+///
+/// # Tolerance
+/// As [`SweptMoves::nearest`].
 pub(super) fn below(
     solid: &Solid,
     motion: &Motion,

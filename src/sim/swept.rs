@@ -14,22 +14,7 @@ pub(super) mod tests;
 
 use super::form::{Family, Form};
 use super::track::{Track, larger, smaller};
-use cutter::Cutter;
-use geometry::{Point3, Vector3};
-
-/// The volume that a cutter sweeps along one straight move, seen from above: its lower envelope.
-///
-/// # Tolerance
-/// Ball and flat end: closed form. Bull nose and taper: closed form on disc and cone; on the arc
-/// (a torus) a safeguarded Newton iteration to the last bits of f64. The result is that of a
-/// distance from the axis that is wrong by a few units in the last place: below 1e-12 mm where the
-/// profile is gentle, up to 1e-7 mm at the very rim, where any profile with a corner radius is
-/// vertical and the distance itself is not known better.
-#[derive(Debug, Clone, Copy)]
-pub struct SweptMove {
-    form: Form,
-    track: Track,
-}
+use geometry::Vector3;
 
 /// Where the cutter stands when it makes the lowest cut at a point.
 #[derive(Debug, Clone, Copy)]
@@ -51,26 +36,6 @@ enum TouchedBy {
     /// A sharp edge of this radius, as the cutter climbs past: the profile is less steep than the
     /// move inside of the edge, and steeper, or ended, outside.
     Edge(f64),
-}
-
-impl SweptMove {
-    /// Prepares the sweep of the tip from `from` to `to`, mm, in any direction, also vertical or of
-    /// no length.
-    pub fn new(cutter: &Cutter, from: Point3, to: Point3) -> Self {
-        Self { form: Form::new(cutter), track: Track::new(from, to) }
-    }
-
-    /// Lowest height of the swept cutter at `(x, y)`, mm; `None` where it does not pass.
-    pub fn height(&self, x: f64, y: f64) -> Option<f64> {
-        let height = swept_height(&self.form, &self.track, x, y);
-        (height < f64::INFINITY).then_some(height)
-    }
-
-    /// As [`SweptMove::height`] with the outward normal of the cut surface there (unit, up): for a
-    /// ball it points from the cut to the ball's centre.
-    pub fn height_and_normal(&self, x: f64, y: f64) -> Option<(f64, Vector3)> {
-        swept_height_and_normal(&self.form, &self.track, x, y)
-    }
 }
 
 /// Lowest height of the form swept along the track at `(x, y)`; infinite where it does not pass.
@@ -111,7 +76,8 @@ pub(super) fn rounded_height_below(form: &Form, track: &Track, along: f64, acros
     rounded_height(form, track, along, across)
 }
 
-/// As [`swept_height`], with the unit normal of the cut surface.
+/// As [`swept_height`], with the outward normal of the cut surface there (unit, up): for a ball it points
+/// from the cut to the ball's centre.
 pub(super) fn swept_height_and_normal(form: &Form, track: &Track, x: f64, y: f64) -> Option<(f64, Vector3)> {
     let (along, across) = track.along_across(x, y);
     let touch = match form.family {

@@ -86,15 +86,8 @@ impl Edge {
 }
 
 impl OutlineEdges {
-    /// From where to where the spline is the pressure side, and the suction side. The second parameter is the
-    /// greater, beyond the end of the period where the stretch passes it. One of the two runs from the
-    /// trailing to the leading edge, see [`pressure_first`](Self::pressure_first).
-    pub fn stretches(&self) -> [[f64; 2]; 2] {
-        let first = self.stretch(self.leading.parameters[1], self.trailing.parameters[0]);
-        let second = self.stretch(self.trailing.parameters[1], self.leading.parameters[0]);
-        if self.pressure_first { [first, second] } else { [second, first] }
-    }
-
+    /// From where to where the spline lies between two parameters. The second is the greater, beyond the end
+    /// of the period where the stretch passes it.
     fn stretch(&self, from: f64, to: f64) -> [f64; 2] {
         let [start, end] = self.spline.domain();
         [from, if to > from { to } else { to + (end - start) }]

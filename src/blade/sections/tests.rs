@@ -438,10 +438,6 @@ fn sides_of_closed_outlines_begin_and_end_at_the_edges() {
         assert!((geometry::signed_area(&s.around) - given).abs() < 2e-3 * given);
         let both = Outline::Sides { pressure: s.pressure.clone(), suction: s.suction.clone() };
         assert!((both.signed_area() - geometry::signed_area(&s.around)).abs() < 1e-9);
-        let [p, q] = e.stretches();
-        let [start, end] = e.spline.domain();
-        assert!((p[1] - p[0] + q[1] - q[0] - (end - start)).abs() < 1e-9);
-        assert!(p[0] < p[1] && q[0] < q[1]);
         // Every point of the table is on one of the sides, but for those that an edge replaced.
         assert!(s.around.len() >= section.outline.point_count());
         // The suction side is the longer one.

@@ -5,7 +5,7 @@
 //! so that a function of the coarse mesh has a value there (mean value coordinates, Floater 2003).
 
 use super::{FieldMesh, MeshFieldError};
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 
 /// A vertex is not drawn into another where that turns a triangle by more than this, as a cosine (30°).
 const TURNED: f64 = 0.866;
@@ -166,7 +166,7 @@ impl Thinned<'_> {
         for &t in &self.at[v as usize] {
             let others = self.triangles[t as usize].into_iter().filter(|&w| w != v);
             let [a, b] = [others.clone().next().unwrap_or(v), others.last().unwrap_or(v)];
-            let half = (0.5 * self.to(v, a).angle(&self.to(v, b))).tan();
+            let half = (0.5 * angle_between(&self.to(v, a), &self.to(v, b))).tan();
             for w in [a, b] {
                 let distance = self.to(v, w).norm();
                 shares.iter_mut().filter(|share| share.0 == w).for_each(|share| share.1 += half / distance);

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use super::{Bend, MeshFieldError, Sheets};
 use foldhash::fast::FixedState;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 
 /// Greatest number of triangles of a refined mesh: what a machine of 8 GB factorises in seconds.
 const MAX_TRIANGLES: usize = 2_000_000;
@@ -63,7 +63,7 @@ impl Refined {
             let p = corners.map(|i| self.points[i as usize]);
             for k in 0..3 {
                 let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-                let angle = a.cross(&b).norm().atan2(a.dot(&b));
+                let angle = angle_between(&a, &b);
                 let (v, wedge) = (corners[k] as usize, wedges[k] as usize);
                 normals[v] += self.sheets.normals[wedge] * angle;
                 bends[v].add(&self.sheets.bends[wedge], angle);

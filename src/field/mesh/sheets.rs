@@ -8,7 +8,7 @@
 //! Refining a mesh interpolates what stands in its wedges, so that curvature is that of the vertices
 //! that the file gave and not that of their flat facets.
 
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use work::parallel;
 
 use super::FieldMesh;
@@ -100,7 +100,7 @@ impl Sheets {
             let p = mesh.corners(t);
             for k in 0..3 {
                 let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-                normals[wedge[k] as usize] += face[t] * a.cross(&b).norm().atan2(a.dot(&b));
+                normals[wedge[k] as usize] += face[t] * angle_between(&a, &b);
                 at_wedge[wedge[k] as usize] = t as u32;
             }
         }

@@ -2,7 +2,7 @@
 //! smoothed ([`super::smooth_lines`]) or blended with others ([`super::blend`]).
 
 use super::{FieldMesh, Wanted};
-use geometry::{Point2, Vector3, distance_to_segment};
+use geometry::{Point2, Vector3, angle_between, distance_to_segment};
 use work::parallel;
 
 /// A border that turns by more than this at a vertex, nearly back, has no direction there, rad.
@@ -67,7 +67,7 @@ pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
             let normal = &mesh.normals()[v];
             let flat = |d: Vector3| d - normal * normal.dot(&d);
             let (before, after) = (flat(before), flat(after));
-            if before.cross(&after).norm().atan2(before.dot(&after)) > CUSP {
+            if angle_between(&before, &after) > CUSP {
                 continue;
             }
             let unit = |d: Vector3| d.try_normalize(NO_DIRECTION * d.norm()).unwrap_or_else(Vector3::zeros);

@@ -3,7 +3,7 @@
 //! Enters: points (mm) and triangles that are counter-clockwise seen from outside. Leaves: the mesh
 //! with all that fields ask it, or why it cannot carry one.
 
-use geometry::{Point3, TriangleMesh, Vector3};
+use geometry::{Point3, TriangleMesh, Vector3, angle_between};
 
 /// Stands for "no triangle" in neighbour lists.
 const NONE: u32 = u32::MAX;
@@ -362,7 +362,7 @@ fn mean_normals(points: &[Point3], triangles: &[[u32; 3]]) -> Vec<Vector3> {
         let normal = (p[1] - p[0]).cross(&(p[2] - p[0])).normalize();
         for k in 0..3 {
             let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-            sums[corners[k] as usize] += normal * a.cross(&b).norm().atan2(a.dot(&b));
+            sums[corners[k] as usize] += normal * angle_between(&a, &b);
             any[corners[k] as usize] = normal;
         }
     }

@@ -5,6 +5,7 @@
 //! every closed mesh. On an open mesh a query beyond the border gets the side of the border's face.
 
 use super::{Bvh, Feature, MeshFoot};
+use crate::angle_between;
 use crate::{Point3, TriangleMesh, Vector3};
 
 /// The nearest point of one triangle.
@@ -134,8 +135,7 @@ pub(super) fn vertex_normals(mesh: &TriangleMesh) -> Vec<Vector3> {
         for k in 0..3 {
             let to = |i: usize| corners[(k + i) % 3] - corners[k];
             let (u, v) = (to(1), to(2));
-            // The arc tangent stays accurate where the arc cosine does not, near 0 and π.
-            let angle = u.cross(&v).norm().atan2(u.dot(&v));
+            let angle = angle_between(&u, &v);
             normals[face[k] as usize] += normal * angle;
         }
     }

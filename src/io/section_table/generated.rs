@@ -37,8 +37,7 @@ pub fn parse_blade(source: &SceneText) -> Result<GeneratedBlade, SceneError> {
         root.word("stacking", &["centroid"])?;
         Stacking::Centroid
     } else {
-        let share = root.number("stacking", 0.0..=1.0, " (a share of the chord)")?;
-        Stacking::Chord(share.map_or(DEFAULT_STACKING, |s| s.value))
+        Stacking::Chord(root.number_or("stacking", 0.0..=1.0, " (a share of the chord)", DEFAULT_STACKING)?)
     };
     let tables = root.sections("station")?;
     if tables.len() < 2 {
@@ -59,11 +58,7 @@ pub fn parse_blade(source: &SceneText) -> Result<GeneratedBlade, SceneError> {
                 station.height / scale,
                 before.height / scale
             );
-            return Err(table.error(
-                &table.key_span("height"),
-                message,
-                "give stations in rising order of height",
-            ));
+            return Err(table.key_error("height", message, "give stations in rising order of height"));
         }
         stations.push(station);
     }
@@ -80,7 +75,7 @@ fn trailing_edge(root: &Section<'_>, scale: f64) -> Result<TrailingEdge, SceneEr
     if root.has(KEY) && !root.is_text(KEY) {
         let cure = "write \"closed\", \"open\" or { radius = 0.3 }";
         let message = "`trailing_edge` of the blade is neither a word nor a table";
-        return Err(root.error(&root.key_span(KEY), message, cure));
+        return Err(root.key_error(KEY, message, cure));
     }
     Ok(match root.word(KEY, &["closed", "open"])?.map(|word| word.value) {
         Some("open") => TrailingEdge::Open,
@@ -97,10 +92,8 @@ fn station(table: &Section<'_>, scale: f64) -> Result<Station, SceneError> {
         table.error(&text.span, e.to_string(), "write four digits between quotes, such as \"2412\"")
     })?;
     let chord = table.required_number("chord", LENGTH, "", 40.0)?.value;
-    let angle = table.number("angle", -360.0..=360.0, " degrees")?.map_or(0.0, |a| a.value);
-    let thickness = table
-        .number("thickness", 0.005..=0.5, " (a share of the chord)")?
-        .map_or(digits.thickness, |t| t.value);
+    let angle = table.number_or("angle", -360.0..=360.0, " degrees", 0.0)?;
+    let thickness = table.number_or("thickness", 0.005..=0.5, " (a share of the chord)", digits.thickness)?;
     let [x, y] =
         table.pair("lean", "write where the stacking point lies: `lean = [0, 2.5]`")?.unwrap_or([0.0; 2]);
     Ok(Station {

@@ -9,7 +9,7 @@ use collision::{LeastClearance, Obstacle};
 use cutter::{Cutter, Solid};
 use metrology::View;
 use motion::{Move, MoveKind, Toolpath};
-use report::{Claim, Figure, FigureTable, Gravity, place};
+use report::{Claim, Figure, FigureTable, Gravity, capital, place};
 use serde::Serialize;
 use sim::{FAR, VoxelEngine, holder_clearance};
 use work::monitor::Monitor;
@@ -50,7 +50,7 @@ const MEANING: (&str, &str) = (
 );
 
 /// How near two bodies come on a path.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PairClearance {
     /// Which part of the tool, or which body of the machine.
     pub tool: String,
@@ -220,20 +220,7 @@ fn with_standing_stock(
 
 impl PairClearance {
     fn new((tool, other): (&str, String)) -> Self {
-        Self {
-            tool: tool.to_owned(),
-            other,
-            clearance_mm: None,
-            error_bound_mm: None,
-            at_mm: None,
-            move_index: None,
-            line: None,
-            tool_number: None,
-            reason: None,
-            needed: 0.0,
-            off: 0.0,
-            more: String::new(),
-        }
+        Self { tool: tool.to_owned(), other, ..Self::default() }
     }
 
     /// From a mesh that stands off the true surface by up to `off`.
@@ -339,11 +326,6 @@ fn decimals(clearance: f64) -> usize {
     const MOST: usize = 9;
     let shows = |digits: &usize| -clearance >= 0.5 * 0.1f64.powi(*digits as i32);
     if clearance < 0.0 { (3..MOST).find(shows).unwrap_or(MOST) } else { 3 }
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// That shank and holder stay as far from part and fixtures as the scene asks for.

@@ -6,7 +6,7 @@
 //! sides (half-angle formula, exact for small and for great angles alike), and θ₂ = θ₂₀ ± Θ, with θ₂₀ where b
 //! is nearest to u₁. The angle ψ at u₁ then tells how far R₁ has to turn: θ₁ = azimuth(a) ± ψ.
 
-use geometry::Vector3;
+use geometry::{Vector3, angle_between};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How far beyond reach, rad, a tool axis may be by rounding; it is then taken at the edge. Also where
@@ -38,11 +38,6 @@ pub(super) struct Solved {
     pub lead: f64,
     /// Angle to the nearer end of the first axis, rad.
     pub from_pole: f64,
-}
-
-/// The angle between two vectors.
-pub(super) fn angle_between(a: &Vector3, b: &Vector3) -> f64 {
-    a.cross(b).norm().atan2(a.dot(b))
 }
 
 impl Triangle {

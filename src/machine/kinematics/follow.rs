@@ -1,13 +1,12 @@
 //! A toolpath as joints: enters a path, leaves the values of the five joints along it with points put in
 //! where straight joints would lead the tool astray, and a report of what the machine has to do.
 
-use super::angles::angle_between;
 use super::choice::{State, Stop};
 use super::refine::{Course, refine, straying};
 use super::report::{JointReport, Rewind};
 use super::{Joints, Kinematics};
 use crate::kinematics::{choice, report};
-use geometry::Vector3;
+use geometry::{Vector3, angle_between};
 use motion::{ClPoint, MoveKind, Toolpath};
 
 /// A tool axis this near to the first rotary axis, rad, is taken to be along it: the end of a cutter of 100

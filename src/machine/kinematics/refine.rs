@@ -9,7 +9,7 @@
 //! few points.
 
 use super::{Joints, Kinematics, RotaryAxis, Stage};
-use geometry::Vector3;
+use geometry::{Vector3, angle_between};
 
 /// A place in the middle of a piece with two derivatives by the share, and bounds on the lengths of the place
 /// and of three derivatives over the whole piece.
@@ -77,7 +77,7 @@ pub(super) fn straying(kinematics: &Kinematics, from: &Joints, to: &Joints) -> [
     let axis = [1, 0].into_iter().fold(Motion::still(Vector3::z()), |x, k| turned(x, k, &Vector3::zeros()));
     // Turning evenly by α between its ends: a″ = −α² a, |a‴| = α³.
     let ends = [from, to].map(|joints| kinematics.tool_axis(joints.rotary));
-    let angle = super::angles::angle_between(&ends[0], &ends[1]);
+    let angle = angle_between(&ends[0], &ends[1]);
     let even = (ends[0] + ends[1]).try_normalize(1e-12).unwrap_or(ends[0]);
     let bound = |second: Vector3, third: f64| second.norm() / 8.0 + third / 48.0;
     [

@@ -1,10 +1,9 @@
 //! What a machine has to do for a path: ranges, turning, singular poses, rewinds, limits, time.
 
-use super::angles::angle_between;
 use super::choice::LIMIT_SLACK;
 use super::follow::{JointPath, Turn, passes};
 use super::{Joints, Kinematics};
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::{MoveKind, Toolpath};
 use std::f64::consts::PI;
 

@@ -1,6 +1,6 @@
 //! Why a mesh has no such offset surface.
 
-use geometry::{MAX_COORDINATE, MeshError};
+use geometry::MAX_COORDINATE;
 use work::monitor::Cancelled;
 
 /// Why there is no offset surface.
@@ -59,13 +59,5 @@ pub enum OffsetError {
     Empty {
         /// Distance, mm.
         distance: f64,
-    },
-    /// The triangles do not make a surface.
-    #[error("the offset surface in cells of {cell} mm is no surface ({reason}); use other cells")]
-    NoSurface {
-        /// Side, mm.
-        cell: f64,
-        /// What is wrong.
-        reason: MeshError,
     },
 }

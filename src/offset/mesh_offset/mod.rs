@@ -80,15 +80,4 @@ impl MeshOffset {
         let contour::Contour { vertices, triangles, .. } = kept;
         Ok(Self { vertices, triangles, valleys, cell: settings.cell })
     }
-
-    /// The triangles as a checked mesh.
-    ///
-    /// # Errors
-    /// [`OffsetError::NoSurface`].
-    pub fn mesh(&self) -> Result<TriangleMesh, OffsetError> {
-        let refused = |reason| OffsetError::NoSurface { cell: self.cell, reason };
-        TriangleMesh::new(self.vertices.clone(), self.triangles.clone())
-            .map(|(mesh, _)| mesh)
-            .map_err(refused)
-    }
 }

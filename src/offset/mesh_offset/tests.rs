@@ -59,6 +59,11 @@ fn assert_sound(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) {
     assert!(folded < 1e-4, "{folded} of it faces the mesh");
 }
 
+/// The triangles of an offset as a checked mesh.
+fn surface(of: &MeshOffset) -> TriangleMesh {
+    TriangleMesh::new(of.vertices.clone(), of.triangles.clone()).unwrap().0
+}
+
 /// The share of its area that faces the mesh, of a surface that is sound else.
 fn folded(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
     // Brute force is slow: some hundreds of them.
@@ -67,7 +72,7 @@ fn folded(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
         let off = distance(&of.0, p) - d;
         assert!(off.abs() < 1e-9, "{p}: {off:e}");
     }
-    let checked = found.mesh().unwrap();
+    let checked = surface(found);
     let (mut inward, mut all) = (0.0, 0.0);
     for t in &found.triangles {
         let [a, b, c] = t.map(|v| found.vertices[v as usize]);
@@ -85,7 +90,7 @@ fn folded(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
 /// without triangles at a border, which may cut across a valley's end.
 fn deviation(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
     let level = LevelSet::new(&of.0, &of.1, d);
-    let mesh = found.mesh().unwrap();
+    let mesh = surface(found);
     let mut border = vec![false; found.vertices.len()];
     let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
     let all: std::collections::HashSet<[u32; 2]> = mesh.triangles().iter().flat_map(sides).collect();
@@ -266,7 +271,7 @@ fn of_a_closed_box_has_its_area() {
     let cuboid = mesh(&points, &triangles);
     let found = offset(&cuboid, &settings(1.0, 0.1));
     assert_sound(&cuboid, &found, 1.0);
-    assert!(found.mesh().unwrap().is_closed() && found.valleys.is_empty());
+    assert!(surface(&found).is_closed() && found.valleys.is_empty());
     // Faces, a quarter of a cylinder along each edge, a sphere at the corners (Steiner).
     let pi = std::f64::consts::PI;
     let exact = 2.0 * (30.0 + 24.0 + 20.0) + 2.0 * pi * (6.0 + 5.0 + 4.0) + 4.0 * pi;
@@ -383,7 +388,7 @@ proptest! {
         // Where valleys meet within a coarse cell, slivers may fold over.
         let folded = folded(&ground, &found, d);
         prop_assert!(folded < 2e-3, "{folded}");
-        let surface = found.mesh().unwrap();
+        let surface = surface(&found);
         let tree = Bvh::new(&surface);
         let level = LevelSet::new(&ground.0, &ground.1, d);
         for (x, y) in places {

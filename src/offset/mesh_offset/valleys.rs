@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::OffsetSettings;
 use super::contour::Contour;
 use super::level_set::LevelSet;
-use geometry::{Point3, Vector3, share_on};
+use geometry::{Point3, Vector3, angle_between, share_on};
 
 /// Two faces meet in a valley where the angle between them is at least this share of the one between the
 /// directions to the mesh.
@@ -148,7 +148,7 @@ fn valley_edges(contour: &Contour, least: f64) -> Vec<[u32; 2]> {
             [Some(m), Some(n)] => {
                 // The triangle of the first normal lies to the left of the way from a to b.
                 let left = m.cross(&(q - p));
-                let turn = m.cross(n).norm().atan2(m.dot(n));
+                let turn = angle_between(m, n);
                 turn > SHARE * angle && n.dot(&left) > 0.0
             }
             // Along a border there is no telling from one triangle.

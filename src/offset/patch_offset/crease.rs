@@ -1,7 +1,7 @@
 //! Creases of a patch: knot lines along which its normal jumps, and the offset is torn or crosses itself.
 
 use super::OffsetSurface;
-use geometry::{KnotVector, Vector3, unit_normal};
+use geometry::{KnotVector, Vector3, angle_between, unit_normal};
 
 /// Places looked at in each span along a knot line.
 const LOOKS: usize = 8;
@@ -50,7 +50,7 @@ fn crease(offset: &OffsetSurface, along: usize, at: f64, others: &[f64]) -> Crea
         let [before, after] = [place(at.next_down(), other), place(at, other)];
         let normals = [before, after].map(|[u, v]| unit_normal(surface, u, v));
         let [Some(n0), Some(n1)] = normals else { continue };
-        let angle = n0.cross(&n1).norm().atan2(n0.dot(&n1));
+        let angle = angle_between(&n0, &n1);
         let jet = surface.jet(after[0], after[1]);
         let across: Vector3 = if along == 0 { jet.du } else { jet.dv };
         // Concave toward the normal where normals lean toward each other.

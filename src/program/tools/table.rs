@@ -52,7 +52,7 @@ impl ToolTable {
             let tool = read(section)?;
             if tools.iter().any(|other| other.number == tool.number) {
                 let message = format!("two tools have the number {}", tool.number);
-                return Err(section.error(&section.key_span("number"), message, "give each its own"));
+                return Err(section.key_error("number", message, "give each its own"));
             }
             tools.push(tool);
         }
@@ -187,13 +187,7 @@ fn read_holder(section: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>,
         (None, Some(length)) => length,
         (None, None) => section.required_length("cutting_length", 20.0)?.value,
     };
-    let one = |section: &Section<'_>| {
-        section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
-        let diameter = section.required_length("diameter", 32.0)?.value;
-        let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
-        Ok(HolderSection { diameter, top_diameter, length: section.required_length("length", 40.0)?.value })
-    };
-    let sections: Vec<HolderSection> = sections.iter().map(one).collect::<Result<_, SceneError>>()?;
+    let sections = sections.iter().map(HolderSection::read).collect::<Result<_, _>>()?;
     Holder::new(length, sections).map(Some).map_err(|e| {
         let cure =
             "add `[[tool.holder]]` with `diameter` and `length` for shank and holder, the lowest first";

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use blade::{Blade, BladeSettings, BladeSide, FairingMethod, JUMP_REMOVING_STEP};
 use geometry::{Isometry3, Vector3};
 use io::section_table;
-use keys::{LENGTH, SceneError, Section, toml_number, toml_string};
+use keys::{LENGTH, SceneError, Section, toml_number, toml_numbers, toml_string};
 use nalgebra::{Translation3, UnitQuaternion};
 use part::{Part, Patch, default_tessellation_tolerance};
 
@@ -64,8 +64,8 @@ fn read_fairing(table: &Section<'_>) -> Result<(FairingMethod, f64), SceneError>
             FairingMethod::Published { neighbours: count as usize }
         }
         (_, Some(_)) => {
-            return Err(table.error(
-                &table.key_span("neighbours"),
+            return Err(table.key_error(
+                "neighbours",
                 format!("`neighbours` says nothing to the method \"{}\"", word.value),
                 "remove it, or write `method = \"published\"`",
             ));
@@ -95,8 +95,8 @@ impl Source for BladeRequest {
         let rotate = part.vector("rotate")?.map_or([0.0; 3], |v| v.value.map(f64::to_radians));
         let pitch = part.vector("pitch")?;
         if pitch.is_none() && side == BladeSide::Passage {
-            return Err(part.error(
-                &part.key_span("side"),
+            return Err(part.key_error(
+                "side",
                 "a passage lies between two blades, and there is one",
                 "add `pitch = [0, 20, 0]`: where the second blade stands, mm from the first",
             ));
@@ -120,10 +120,13 @@ impl Source for BladeRequest {
         writeln!(out, "{KEY} = {}", toml_string(&self.file.written))?;
         let side = SIDES.iter().find(|(_, side)| *side == self.side).map_or("both", |(word, _)| word);
         writeln!(out, "side = \"{side}\"")?;
-        let list = |v: [f64; 3]| format!("[{}]", v.map(toml_number).join(", "));
-        writeln!(out, "rotate = {}  # degrees about x, y, z", list(self.rotate.map(f64::to_degrees)))?;
+        writeln!(
+            out,
+            "rotate = {}  # degrees about x, y, z",
+            toml_numbers(&self.rotate.map(f64::to_degrees))
+        )?;
         if let Some(pitch) = self.pitch {
-            writeln!(out, "pitch = {}  # mm to the second blade", list(pitch.into()))?;
+            writeln!(out, "pitch = {}  # mm to the second blade", toml_numbers(pitch.as_slice()))?;
         }
         match self.fairing {
             Some((method, tolerance)) => {

@@ -32,11 +32,8 @@ const RADIUS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Reads the shape called `surface`, one of [`SURFACES`].
 fn read_shape(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, SceneError> {
-    let height = || Ok::<f64, SceneError>(part.number("height", COORDINATE, " mm")?.map_or(0.0, |v| v.value));
-    let azimuth = || {
-        let azimuth = part.number("azimuth", -360.0..=360.0, " degrees")?;
-        Ok::<f64, SceneError>(azimuth.map_or(0.0, |v| v.value.to_radians()))
-    };
+    let height = || part.number_or("height", COORDINATE, " mm", 0.0);
+    let azimuth = || part.number_or("azimuth", -360.0..=360.0, " degrees", 0.0).map(f64::to_radians);
     let concave = || Ok::<bool, SceneError>(part.flag("concave")?.unwrap_or(false));
     let radius = |key| Ok::<f64, SceneError>(part.required_number(key, RADIUS, " mm", 50.0)?.value);
     Ok(match surface {
@@ -63,9 +60,7 @@ fn read_shape(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, SceneE
             wavelength_x: part.required_length("wavelength_x", 40.0)?.value,
             wavelength_y: part.length("wavelength_y")?.map(|v| v.value),
         },
-        _ => AnalyticShape::PitAndCrest {
-            scale: part.number("scale", 1e-3..=*LENGTH.end(), "")?.map_or(1.0, |v| v.value),
-        },
+        _ => AnalyticShape::PitAndCrest { scale: part.number_or("scale", 1e-3..=*LENGTH.end(), "", 1.0)? },
     })
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use field::fill;
 use geometry::{Point2, Point3, Region, RegionError, TriangleMesh};
 use io::outline::{self, OutlineFormat, OutlineOptions};
-use keys::{SceneError, Section, toml_number, toml_string};
+use keys::{SceneError, Section, toml_number, toml_points, toml_string};
 use part::Part;
 use toolpath::Pocket;
 use work::monitor::Silent;
@@ -137,14 +137,14 @@ impl Source for PocketSource {
                 }
             }
             OutlineSource::Points { curves } => {
-                writeln!(out, "outline = {}  # mm", list(&curves[0]))?;
-                let islands: Vec<String> = curves[1..].iter().map(|curve| list(curve)).collect();
+                writeln!(out, "outline = {}  # mm", toml_points(&curves[0]))?;
+                let islands: Vec<String> = curves[1..].iter().map(|curve| toml_points(curve)).collect();
                 writeln!(out, "islands = [{}]", islands.join(", "))?;
             }
         }
         writeln!(out, "depth = {}  # mm below z = 0", toml_number(self.depth))?;
         if !self.open.is_empty() {
-            let lines: Vec<String> = self.open.iter().map(|line| list(&line.points)).collect();
+            let lines: Vec<String> = self.open.iter().map(|line| toml_points(&line.points)).collect();
             writeln!(out, "open = [{}]  # mm, along sides without a wall", lines.join(", "))?;
         }
         if let Some(EarlierCutter { diameter, allowance }) = self.cleared {
@@ -171,12 +171,6 @@ impl Source for PocketSource {
         let part = self.floor(&pocket, job)?;
         Ok(Loaded { pocket: Some(pocket), notes, ..Loaded::from(part) })
     }
-}
-
-/// Points as scenes spell them.
-fn list(points: &[Point2]) -> String {
-    let point = |p: &Point2| format!("[{}, {}]", toml_number(p.x), toml_number(p.y));
-    format!("[{}]", points.iter().map(point).collect::<Vec<_>>().join(", "))
 }
 
 fn read_open(part: &Section<'_>) -> Result<Vec<OpenLine>, SceneError> {

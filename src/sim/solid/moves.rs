@@ -280,16 +280,6 @@ impl SweptMoves {
         &self.solid
     }
 
-    /// Number of moves.
-    pub fn len(&self) -> usize {
-        self.motions.len()
-    }
-
-    /// True without moves.
-    pub fn is_empty(&self) -> bool {
-        self.motions.is_empty()
-    }
-
     /// The boxes; `None` without moves.
     pub(crate) fn tree(&self) -> Option<&BoxTree> {
         self.tree.as_ref()
@@ -377,7 +367,9 @@ impl SweptMoves {
     /// The move that comes nearest to `q`, the first of equals, if it comes nearer than `limit`, mm.
     ///
     /// # Tolerance
-    /// As [`SweptSolid`](super::SweptSolid).
+    /// Distances are least over the time of the move to 1e-9 mm. Inside of a solid of several pieces it is
+    /// the depth at the time at which one piece is deepest around the place, which another time may exceed;
+    /// its sign, and all distances outside, are exact.
     pub fn nearest(&self, q: &Point3, limit: f64) -> Option<SweptHit> {
         let mut best: Option<SweptHit> = None;
         self.tree.as_ref()?.search(
@@ -399,23 +391,6 @@ impl SweptMoves {
             },
         );
         best
-    }
-
-    /// Calls `visit` for every move that comes nearer to `q` than `reach` mm, with its index and how near, in
-    /// any order; more than once for a move that stands in the tree in parts, with how near each comes.
-    pub fn near(&self, q: &Point3, reach: f64, mut visit: impl FnMut(u32, f64)) {
-        let Some(tree) = &self.tree else { return };
-        tree.search(
-            -reach,
-            |index, node, _| -self.bound(index, node, q),
-            |slot, now| {
-                let part = self.part(slot);
-                if let Some(found) = below(&self.solid, self.motion(part), q, part.range, reach) {
-                    visit(self.index(part), found.distance);
-                }
-                now
-            },
-        );
     }
 }
 

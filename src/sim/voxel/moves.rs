@@ -17,7 +17,7 @@ use super::slide::{StandIn, slide};
 use crate::solid::{Motion, Nearest, OppositeAxes, below};
 use crate::stock::corner;
 use cutter::Solid;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::Toolpath;
 use work::parallel;
 
@@ -174,7 +174,7 @@ impl MotionParts {
         let [a, b] = part.range.map(|t| {
             let at = motion.at(t);
             let axis = standing.plain.axis;
-            let angle = axis.cross(&at.axis).norm().atan2(axis.dot(&at.axis));
+            let angle = angle_between(&axis, &at.axis);
             ((at.tip - standing.tip).norm(), angle)
         });
         a.0.max(b.0) + a.1.max(b.1) * arm
@@ -433,5 +433,5 @@ impl MotionParts {
 /// The angle by which the axis turns on a move, rad.
 fn turn(motion: &Motion) -> f64 {
     let (a, b) = (motion.at(0.0).axis, motion.at(1.0).axis);
-    a.cross(&b).norm().atan2(a.dot(&b))
+    angle_between(&a, &b)
 }

@@ -137,8 +137,8 @@ pub(super) fn slide(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SweptSolid;
     use crate::scenes::{Rng, cutters};
+    use crate::solid::tests::SweptSolid;
     use motion::ClPoint;
 
     #[test]

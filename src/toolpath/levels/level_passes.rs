@@ -50,31 +50,6 @@ const OVERRUN_STEP: f64 = 0.05;
 /// How closely the crossing of a border is placed, in sampling distances.
 const BORDER_PRECISION: f64 = 1e-6;
 
-/// Places levels, traces them and turns them into passes.
-pub(crate) fn along_levels(task: &Task<'_>, chart: &Chart, field: &ScalarField) -> Result<Passes, PlanError> {
-    along_levels_placed(task, chart, field, LevelSteps::Shortest)
-}
-
-/// [`along_levels`] with levels placed in a given way.
-pub(crate) fn along_levels_placed(
-    task: &Task<'_>,
-    chart: &Chart,
-    field: &ScalarField,
-    placing: LevelSteps,
-) -> Result<Passes, PlanError> {
-    passes_along(task, chart, field, placing, Lines::Levels)
-}
-
-/// [`along_levels`], or along traced lines.
-pub(crate) fn along_lines(
-    task: &Task<'_>,
-    chart: &Chart,
-    field: &ScalarField,
-    lines: Lines,
-) -> Result<Passes, PlanError> {
-    passes_along(task, chart, field, lines.steps(), lines)
-}
-
 /// [`along_levels`] of a function on the chart that is told of; nothing along one on a mesh.
 pub(crate) fn along_levelled(
     task: &Task<'_>,
@@ -82,12 +57,13 @@ pub(crate) fn along_levelled(
     levelled: &Levelled,
 ) -> Result<Passes, PlanError> {
     let LevelFunction::Chart(field) = &levelled.function else { return Ok(Passes::default()) };
-    let mut passes = along_levels(task, chart, field)?;
+    let mut passes = along_levels(task, chart, field, LevelSteps::Shortest, Lines::Levels)?;
     levelled.clone().put_with(&mut passes);
     Ok(passes)
 }
 
-fn passes_along(
+/// Places levels, traces them and turns them into passes.
+pub(crate) fn along_levels(
     task: &Task<'_>,
     chart: &Chart,
     field: &ScalarField,
@@ -442,7 +418,8 @@ mod tests {
         let values: Vec<f64> = (0..(CELLS + 1).pow(2)).map(psi).collect();
         let field = ScalarField::Grid(GridField::new([[-SIDE, SIDE]; 2], [CELLS; 2], &values).unwrap());
         let charts = Chart::all(&part, &cutter, settings.guide()).unwrap();
-        let passes = along_levels_placed(&task, &charts[0], &field, LevelSteps::Constant).unwrap().passes;
+        let passes =
+            along_levels(&task, &charts[0], &field, LevelSteps::Constant, Lines::Levels).unwrap().passes;
         let farthest = (-95..=95).map(|k| {
             let p = Point3::new(0.1 * f64::from(k), SIDE, 0.0);
             let flat = |p: &Point3| Point3::new(p.x, p.y, 0.0);

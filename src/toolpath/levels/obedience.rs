@@ -17,6 +17,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use field::DirectionError;
 use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector2, Vector3, share_on};
 
+use crate::levels::planned_field::in_plan;
 use crate::surface::asked::{self, Row};
 use crate::surface::chart::Chart;
 use crate::vocabulary::{Contact, FeedDirection, Obedience, Task};
@@ -199,11 +200,7 @@ impl Near<'_> {
 
 impl<'a> Beside<'a> {
     fn new(passes: &'a [Vec<Contact>]) -> Self {
-        let sides = |(curve, pass): (usize, &Vec<Contact>)| -> Vec<CurveSegment> {
-            let ends = pass.windows(2).map(|w| [w[0].at.xy(), w[1].at.xy()]);
-            ends.zip(0..).map(|(ends, index)| CurveSegment { ends, curve: curve as u32, index }).collect()
-        };
-        Self { passes, grid: SegmentGrid::new(passes.iter().enumerate().flat_map(sides).collect()) }
+        Self { passes, grid: in_plan(passes) }
     }
 
     /// The place of a side of a pass that is nearest to a row, in the plan view where the row is of that.

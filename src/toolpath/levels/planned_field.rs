@@ -187,13 +187,18 @@ fn evenly(vertices: impl Iterator<Item = (Point3, Vector3)>, cell: f64) -> Vec<F
     nearest.into_values().map(|(_, sample)| sample).collect()
 }
 
-/// Takes the passes and measures how far they lie apart.
-pub(crate) fn measure(planned: &mut PlannedField, passes: &[Vec<Contact>]) {
+/// The sides of passes in the plan view.
+pub(crate) fn in_plan(passes: &[Vec<Contact>]) -> SegmentGrid {
     let sides = |(curve, pass): (usize, &Vec<Contact>)| -> Vec<CurveSegment> {
         let ends = pass.windows(2).map(|w| [w[0].at.xy(), w[1].at.xy()]);
         ends.zip(0..).map(|(ends, index)| CurveSegment { ends, curve: curve as u32, index }).collect()
     };
-    let grid = SegmentGrid::new(passes.iter().enumerate().flat_map(sides).collect());
+    SegmentGrid::new(passes.iter().enumerate().flat_map(sides).collect())
+}
+
+/// Takes the passes and measures how far they lie apart.
+pub(crate) fn measure(planned: &mut PlannedField, passes: &[Vec<Contact>]) {
+    let grid = in_plan(passes);
     planned.passes = work::parallel::map(passes.len(), |k| {
         let point = |(i, contact): (usize, &Contact)| {
             let sides = [1.0, -1.0].map(|side| neighbour(&grid, passes, [k, i], side));

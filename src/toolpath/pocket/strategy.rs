@@ -128,17 +128,7 @@ pub(crate) static FLOW: Definition = Definition {
     word: "pocket-flow",
     help: "a pocket along a flow that follows its walls and islands",
     part: PartKind::Pocket,
-    keys: &[
-        "stepdown",
-        "floor_allowance",
-        "wall_allowance",
-        "wall_finish",
-        "ramp_angle",
-        "helix_radius",
-        "engagement",
-        "spiral",
-        "smoothing",
-    ],
+    keys: &["helix_radius", "engagement", "spiral", "smoothing"],
     read: |from| {
         let flow = Flow { smoothing: length(from.section, "smoothing")?, spiral: spiral(from.section)? };
         read(from, Pattern::Flow(flow))
@@ -150,16 +140,7 @@ pub(crate) static OFFSET: Definition = Definition {
     word: "pocket-offset",
     help: "a pocket along offsets of its walls",
     part: PartKind::Pocket,
-    keys: &[
-        "stepdown",
-        "floor_allowance",
-        "wall_allowance",
-        "wall_finish",
-        "ramp_angle",
-        "helix_radius",
-        "engagement",
-        "spiral",
-    ],
+    keys: &["helix_radius", "engagement", "spiral"],
     read: |from| {
         let spiral = spiral(from.section)?;
         read(from, Pattern::Offset { spiral })
@@ -171,19 +152,10 @@ pub(crate) static ZIGZAG: Definition = Definition {
     word: "pocket-zigzag",
     help: "a pocket in parallel lines",
     part: PartKind::Pocket,
-    keys: &[
-        "stepdown",
-        "floor_allowance",
-        "wall_allowance",
-        "wall_finish",
-        "ramp_angle",
-        "helix_radius",
-        "engagement",
-        "angle",
-    ],
+    keys: &["helix_radius", "engagement", "angle"],
     read: |from| {
-        let angle = from.section.number("angle", -360.0..=360.0, " degrees")?;
-        read(from, Pattern::Zigzag { angle: angle.map_or(0.0, |v| v.value.to_radians()) })
+        let angle = from.section.number_or("angle", -360.0..=360.0, " degrees", 0.0)?.to_radians();
+        read(from, Pattern::Zigzag { angle })
     },
 };
 
@@ -192,20 +164,7 @@ pub(crate) static STREAMLINE: Definition = Definition {
     word: "pocket-streamline",
     help: "a pocket along levels of a stream function that follows feed directions",
     part: PartKind::Pocket,
-    keys: &[
-        "stepdown",
-        "floor_allowance",
-        "wall_allowance",
-        "wall_finish",
-        "ramp_angle",
-        "direction",
-        "directions",
-        "guides",
-        "across",
-        "direction_weight",
-        "along_walls",
-        "lines",
-    ],
+    keys: &["direction", "directions", "guides", "across", "direction_weight", "along_walls", "lines"],
     read: |from| {
         let direction = direction_keys::read_level(from.section, &mut from.tables)?;
         let direction_weight = direction_keys::read_weight(from.section)?;
@@ -228,13 +187,11 @@ fn spiral(section: &Section<'_>) -> Result<bool, SceneError> {
 /// The keys of all of them.
 fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, SceneError> {
     let section = from.section;
-    let allowance = |key| {
-        Ok::<f64, SceneError>(section.number(key, 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value))
-    };
+    let allowance = |key| section.number_or(key, 0.0..=*LENGTH.end(), " mm", 0.0);
     let wall_allowance = allowance("wall_allowance")?;
     if section.has("wall_finish") && wall_allowance == 0.0 {
-        return Err(section.error(
-            &section.key_span("wall_finish"),
+        return Err(section.key_error(
+            "wall_finish",
             "`wall_finish` does not apply without a `wall_allowance`",
             "delete it, or leave something at the walls: `wall_allowance = 0.2`",
         ));
@@ -247,9 +204,7 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
         floor_allowance: allowance("floor_allowance")?,
         wall_allowance,
         wall_finish: section.choice("wall_finish", &WallFinish::WORDS)?,
-        ramp_angle: radians(
-            section.number("ramp_angle", 0.1..=45.0, " degrees")?.map_or(RAMP_ANGLE, |v| v.value),
-        ),
+        ramp_angle: radians(section.number_or("ramp_angle", 0.1..=45.0, " degrees", RAMP_ANGLE)?),
         helix_radius: length(section, "helix_radius")?,
         engagement: section.number("engagement", 10.0..=180.0, " degrees")?.map(|v| radians(v.value)),
         gentle: Vec::new(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::vocabulary::{Along, FeedDirection};
 use field::DIRECTION_WEIGHT;
 use field::mesh::Sense;
-use keys::{Located, SceneError, Section, toml_number, toml_string};
+use keys::{Located, SceneError, Section, toml_number, toml_points, toml_string};
 
 /// The keys of a direction, where it is the value of the first of them.
 pub(crate) const KEYS: [&str; 4] = ["direction", "directions", "guides", "across"];
@@ -28,8 +28,7 @@ const DIRECTION_WEIGHTS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
 /// How much following a direction counts over the distances of passes.
 pub(crate) fn read_weight(section: &Section<'_>) -> Result<f64, SceneError> {
-    let weight = section.number("direction_weight", DIRECTION_WEIGHTS, "")?;
-    Ok(weight.map_or(DIRECTION_WEIGHT, |weight| weight.value))
+    section.number_or("direction_weight", DIRECTION_WEIGHTS, "", DIRECTION_WEIGHT)
 }
 
 /// Reads a direction and the files that it names, in order; what these hold is read later. `None` for the
@@ -88,7 +87,7 @@ fn read_one(
         ),
     ] {
         if section.has(key) && !wanted.contains(&word) {
-            return Err(section.error(&section.key_span(key), format!("`{key}` names {what}"), cure));
+            return Err(section.key_error(key, format!("`{key}` names {what}"), cure));
         }
     }
     Ok(direction)
@@ -112,7 +111,7 @@ fn read_word(
                         `guides = [[[0, 0], [50, 10]], [[0, 40], [50, 45]]]`";
             let curves = section.curves("guides")?;
             if curves.is_empty() {
-                return Err(section.error(&section.key_span("direction"), "no `guides` to follow", cure));
+                return Err(section.key_error("direction", "no `guides` to follow", cure));
             }
             if let Some(point) = curves.iter().find(|curve| curve.value.windows(2).all(|w| w[0] == w[1])) {
                 return Err(section.error(&point.span, "this guide curve has no length", cure));
@@ -143,8 +142,8 @@ fn read_blend(
     let keys: Vec<&str> = KEYS.into_iter().chain(["weight"]).collect();
     let parts = table.sections("blend")?;
     if parts.len() < 2 {
-        return Err(table.error(
-            &table.key_span("blend"),
+        return Err(table.key_error(
+            "blend",
             "a blend takes two directions or more",
             "write `blend = [{ direction = \"widest-strip\", weight = 2 }, { direction = \"steepest\" }]`",
         ));
@@ -156,11 +155,11 @@ fn read_blend(
         }
         if part.inline("direction").is_some_and(|inner| inner.has("blend")) {
             let cure = "give all directions and their weights in one blend";
-            return Err(part.error(&part.key_span("direction"), "a blend cannot be blended again", cure));
+            return Err(part.key_error("direction", "a blend cannot be blended again", cure));
         }
         // The words leave the shortest path out, so that there is always a direction.
         let direction = read_one(part, &words, words[0], files)?.unwrap_or(FeedDirection::WidestStrip);
-        Ok((direction, part.number("weight", WEIGHT, "")?.map_or(1.0, |weight| weight.value)))
+        Ok((direction, part.number_or("weight", WEIGHT, "", 1.0)?))
     };
     Ok(FeedDirection::Blend(parts.iter().map(read_part).collect::<Result<_, SceneError>>()?))
 }
@@ -185,11 +184,7 @@ pub(crate) fn write(out: &mut String, direction: &FeedDirection, separator: &str
         // No scene spells samples that no file holds.
         FeedDirection::Samples(_) => word(out, "file"),
         FeedDirection::Guides { curves, sense } => {
-            let points = curves.iter().map(|curve| {
-                let points = curve.iter().map(|p| format!("[{}, {}]", toml_number(p.x), toml_number(p.y)));
-                format!("[{}]", points.collect::<Vec<_>>().join(", "))
-            });
-            let curves = points.collect::<Vec<_>>().join(", ");
+            let curves = curves.iter().map(|curve| toml_points(curve)).collect::<Vec<_>>().join(", ");
             write!(out, "direction = \"guide\"{separator}guides = [{curves}]{separator}{}", across(*sense))
         }
         FeedDirection::Border(sense) => write!(out, "direction = \"border\"{separator}{}", across(*sense)),

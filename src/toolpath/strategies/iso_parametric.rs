@@ -3,10 +3,10 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::levels::level_passes::along_levels_placed;
+use crate::levels::level_passes::along_levels;
 use crate::levels::spacing::LevelSteps;
 use crate::surface::chart::Chart;
-use crate::vocabulary::{Along, Definition, PartKind, Passes, PlanError, Strategy, Task};
+use crate::vocabulary::{Along, Definition, Lines, PartKind, Passes, PlanError, Strategy, Task};
 use field::{Axis, ScalarField};
 use keys::word_of;
 
@@ -85,7 +85,7 @@ fn passes_along(task: &Task<'_>, along: Along, placing: LevelSteps) -> Result<Pa
     });
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter, settings.guide())? {
-        all.append(along_levels_placed(task, &chart, &field, placing)?);
+        all.append(along_levels(task, &chart, &field, placing, Lines::Levels)?);
     }
     Ok(all)
 }

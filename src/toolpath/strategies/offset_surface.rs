@@ -108,8 +108,8 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     let along = section.choice("along", &ALONG)?;
     let along = match angle {
         Some(_) if section.has("along") => {
-            return Err(section.error(
-                &section.key_span("angle"),
+            return Err(section.key_error(
+                "angle",
                 "passes run along a parameter or at an angle, not both",
                 "delete `angle` on patches and blades, `along` on meshes",
             ));

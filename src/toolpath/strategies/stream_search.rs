@@ -1,7 +1,7 @@
 //! The search for the stream function of one chart whose passes cost least.
 //!
 //! A B-spline is minimised from straight passes in several directions on a coarse net, and from fronts of the
-//! four borders, because each start leads to a minimum of its own ([`field::minimise_priced`]).
+//! four borders, because each start leads to a minimum of its own ([`field::minimise`]).
 //!
 //! A function that goes on from a front is the front itself, whose levels are the first iterate, and what a
 //! spline puts to it. It stays constant along the border that the front started at: its first pass runs along
@@ -23,7 +23,6 @@ use crate::vocabulary::{FeedDirection, PlanError, Step};
 use cutter::Cutter;
 use field::{
     Gradients, GridField, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, Site, Tied,
-    minimise_priced,
 };
 use geometry::KnotVector;
 use work::monitor::{Cancelled, Monitor};
@@ -235,7 +234,7 @@ impl Search<'_> {
         end: f64,
         rounds: Rounds,
     ) -> Result<Option<Packed>, Cancelled> {
-        minimise_priced(&net.sites, &net.gradients, &net.roughness, end, start, rounds, self.monitor)
+        field::minimise(&net.sites, &net.gradients, &net.roughness, end, start, rounds, self.monitor)
     }
 
     /// A function like the one found, of a whole number of passes: what is left over would be another pass.

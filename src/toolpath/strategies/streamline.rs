@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use super::direction_keys;
 use super::mesh_passes::{self, Aim};
 use super::shortest::{self, Objective, ShortestStreamline};
-use crate::levels::level_passes::along_lines;
+use crate::levels::level_passes::along_levels;
 use crate::levels::{obedience, planned_field};
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
@@ -147,7 +147,7 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     if section.has("objective") {
         let message = "`objective` does not act where passes follow a direction".to_owned();
         let cure = "delete it, or leave the direction free";
-        return Err(section.error(&section.key_span("objective"), message, cure));
+        return Err(section.key_error("objective", message, cure));
     }
     let control_points = section.count("control_points", 4..=200)?.map(|n| n as usize);
     let (method, solver) = read_method(section, control_points.unwrap_or(DEFAULT_CONTROL_POINTS))?;
@@ -155,7 +155,7 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
         if !matches!(direction, FeedDirection::File { .. }) {
             let message = "the published fit is made to the vectors of a table".to_owned();
             let cure = "add `direction = \"file\"` and `directions = \"FILE\"`, or write another method";
-            return Err(section.error(&section.key_span("method"), message, cure));
+            return Err(section.key_error("method", message, cure));
         }
         PUBLISHED_CONTROL_POINTS
     } else {
@@ -178,8 +178,7 @@ fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMe
     let rule = section.word("knots", &KnotRule::WORDS)?.and_then(|word| KnotRule::from_word(word.value));
     let chosen = section.word("solver", &Solver::WORDS)?;
     let solver = chosen.as_ref().and_then(|word| Solver::from_word(word.value));
-    let refuse =
-        |key: &str, message: String, cure: &str| Err(section.error(&section.key_span(key), message, cure));
+    let refuse = |key: &str, message: String, cure: &str| Err(section.key_error(key, message, cure));
     if method == Some("elements") {
         if let Some(key) = SPLINE_KEYS.into_iter().find(|key| section.has(key)) {
             let message = format!("`{key}` does not apply to finite elements, which `method` asks for");
@@ -313,7 +312,7 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
         }
         let spread = feed::on_chart(direction, &chart, cutter)?;
         let (field, mut notes, wanted) = stream_function(&calculated, cutter, &spread, asked, settings.step)?;
-        let mut passes = along_lines(task, &chart, &field, asked.lines)?;
+        let mut passes = along_levels(task, &chart, &field, asked.lines.steps(), asked.lines)?;
         let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&spread, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);
         passes.obedience = obedience::on_chart(task, &chart, &mut passes.contacts, [direction, &spread]);

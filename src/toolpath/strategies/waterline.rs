@@ -10,11 +10,11 @@
 use std::fmt::{self, Write as _};
 
 use super::mesh_contours::{self, LEAST_FACING};
-use crate::levels::level_passes::along_levels_placed;
+use crate::levels::level_passes::along_levels;
 use crate::levels::spacing::{LevelSteps, level_tangent};
 use crate::surface::chart::Chart;
 use crate::surface::mesh_surface::STEEPEST_COSINE;
-use crate::vocabulary::{Definition, PartKind, PassSettings, Passes, PlanError, Strategy, Task};
+use crate::vocabulary::{Definition, Lines, PartKind, PassSettings, Passes, PlanError, Strategy, Task};
 use cutter::Cutter;
 use field::{GridField, ScalarField, surface_gradient_length};
 use geometry::TriangleMesh;
@@ -78,7 +78,7 @@ impl Strategy for Waterline {
         for chart in Chart::all(part, cutter, settings.guide())? {
             let field = ScalarField::Grid(heights(&chart, cutter)?);
             let level = level_share(&chart, cutter, &field, settings);
-            all.append(along_levels_placed(task, &chart, &field, self.steps)?);
+            all.append(along_levels(task, &chart, &field, self.steps, Lines::Levels)?);
             if level >= LEAST_TOLD {
                 all.notes.push(format!(
                     "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",

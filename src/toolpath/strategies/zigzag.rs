@@ -10,7 +10,7 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::levels::level_passes::along_levels_placed;
+use crate::levels::level_passes::along_levels;
 use crate::levels::planes::AllowedGaps;
 use crate::levels::spacing::LevelSteps;
 use crate::strategies::mesh_passes::bends_across;
@@ -18,7 +18,9 @@ use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint, dropped_offset};
 use crate::surface::mesh_surface::{ConnectedPiece, reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
-use crate::vocabulary::{Definition, Faces, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use crate::vocabulary::{
+    Definition, Faces, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
+};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::ScalarField;
@@ -196,7 +198,7 @@ fn on_levels(task: &Task<'_>, angle: f64, steps: LevelSteps) -> Result<Passes, P
     for chart in Chart::all(part, cutter, settings.guide())? {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
-        all.append(along_levels_placed(task, &chart, &field, steps)?);
+        all.append(along_levels(task, &chart, &field, steps, Lines::Levels)?);
     }
     Ok(all)
 }

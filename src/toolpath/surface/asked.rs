@@ -11,7 +11,7 @@ use crate::levels::planned_field::NO_MATTER;
 use crate::vocabulary::FeedDirection;
 use field::mesh::{FieldMesh, Sense, Wanted};
 use field::{LineField, SamplePlane};
-use geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector3, angle_between};
 use part::Part;
 
 /// Ground with a slope of less than this, rad, has no direction up or along it.
@@ -149,7 +149,7 @@ fn along_curve(points: &[Point3], is_plan: bool, sense: Sense, spacing: f64) -> 
     let mut points = points.to_vec();
     points.dedup();
     let sides: Vec<Vector3> = points.windows(2).map(|w| w[1] - w[0]).collect();
-    let turns = |a: &Vector3, b: &Vector3| a.cross(b).norm().atan2(a.dot(b)) > CORNER;
+    let turns = |a: &Vector3, b: &Vector3| angle_between(a, b) > CORNER;
     let mut begins = vec![0.0];
     sides.iter().for_each(|side| begins.push(begins[begins.len() - 1] + side.norm()));
     let length = begins[sides.len()];

@@ -15,7 +15,7 @@ use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;
 use collision::{Interference, LastRefusal, Shortfall};
 use cutter::Cutter;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::{CcPoint, ClPoint, location};
 use std::f64::consts::TAU;
 use work::monitor::{self, Cancelled, Monitor};
@@ -236,7 +236,7 @@ impl<'a> Repairing<'a> {
         let greatest = self.room.keep.greatest_tilt;
         let mut first = 0.0;
         if let Some(before) = self.before {
-            let tilt = rule.cross(&before).norm().atan2(rule.dot(&before));
+            let tilt = angle_between(&rule, &before);
             let around = before.dot(&y).atan2(before.dot(&x));
             first = around;
             let step = TAU / AROUND as f64;
@@ -325,7 +325,7 @@ impl<'a> Repairing<'a> {
     /// far off.
     fn led_over(&self, from: &Placed, to: &Placed, rate: f64) -> Placed {
         let (a, b) = (from.touch.at, to.touch.at);
-        let turn = a.axis.cross(&b.axis).norm().atan2(a.axis.dot(&b.axis));
+        let turn = angle_between(&a.axis, &b.axis);
         let most = rate * (to.touch.contact.point - from.touch.contact.point).norm();
         if from.tilt() + RING < to.tilt() || from.tilt() == 0.0 || turn <= most {
             return *to;
@@ -376,7 +376,7 @@ impl Placed {
     /// Angle from the rule, rad.
     fn tilt(&self) -> f64 {
         let axis = self.touch.at.axis;
-        self.rule.cross(&axis).norm().atan2(self.rule.dot(&axis))
+        angle_between(&self.rule, &axis)
     }
 }
 

@@ -22,7 +22,7 @@ use crate::surface::border::Border;
 use crate::vocabulary::{PlanError, Setup};
 use collision::Interference;
 use cutter::Cutter;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::{AxisError, CcPoint, ClPoint, ToolAxis};
 use part::Part;
 use std::ops::Range;
@@ -220,14 +220,13 @@ impl MoveRules<'_> {
     /// Whether the move from one touch of a pass to another holds; `passed` are those from the first to the
     /// second.
     fn hold(&self, passed: &[Touch], a: &Touch, b: &Touch) -> bool {
-        let angle = |a: &Vector3, b: &Vector3| a.cross(b).norm().atan2(a.dot(b));
         let way = b.contact.point - a.contact.point;
-        let slow = |rate: f64| angle(&a.at.axis, &b.at.axis) <= rate * (way.norm() - LOST).max(0.0);
+        let slow = |rate: f64| angle_between(&a.at.axis, &b.at.axis) <= rate * (way.norm() - LOST).max(0.0);
         let near = |most: f64| {
             passed.iter().all(|touch| {
                 let t = (touch.contact.point - a.contact.point).dot(&way)
                     / way.norm_squared().max(f64::MIN_POSITIVE);
-                angle(&touch.at.axis, &a.at.towards(&b.at, t.clamp(0.0, 1.0)).axis) <= most
+                angle_between(&touch.at.axis, &a.at.towards(&b.at, t.clamp(0.0, 1.0)).axis) <= most
             })
         };
         self.turning.is_none_or(slow) && self.straying.is_none_or(near) && self.clear(a, b)

@@ -44,7 +44,16 @@ impl PartKind {
                 "cutter",
                 "holder",
             ],
-            Self::Pocket => &["name", "strategy", "stepover"],
+            Self::Pocket => &[
+                "name",
+                "strategy",
+                "stepover",
+                "stepdown",
+                "floor_allowance",
+                "wall_allowance",
+                "wall_finish",
+                "ramp_angle",
+            ],
             Self::Any => &["name", "strategy", "stock"],
         }
     }

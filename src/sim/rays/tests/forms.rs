@@ -1,8 +1,8 @@
 //! Rays against closed forms.
 
 use super::*;
-use crate::SweptMove;
 use crate::scenes::random_path;
+use crate::swept::tests::SweptMove;
 
 /// What closed forms and rays may lie apart, mm.
 const CLOSE: f64 = 1e-9;

@@ -31,7 +31,7 @@ use crate::moves::touch::{GREATEST_TURN, Touch};
 use crate::vocabulary::PlanSettings;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
-use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3, angle_between};
 use motion::{ClPoint, MoveKind};
 use part::Part;
 use std::f64::consts::TAU;
@@ -397,7 +397,7 @@ fn evenly(from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
 
 /// Moves in which the axis turns little.
 fn turns(from: &ClPoint, to: &ClPoint) -> usize {
-    let turn = from.axis.cross(&to.axis).norm().atan2(from.axis.dot(&to.axis));
+    let turn = angle_between(&from.axis, &to.axis);
     (turn / GREATEST_TURN).ceil().max(1.0) as usize
 }
 
@@ -444,7 +444,7 @@ impl Sphere {
     /// evenly.
     fn around_to(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
         let [a, b] = [from, to].map(|at| (at.tip - self.centre).normalize());
-        let angle = a.cross(&b).norm().atan2(a.dot(&b));
+        let angle = angle_between(&a, &b);
         // Opposite places are joined over the top.
         let side =
             [Vector3::z(), Vector3::x()].into_iter().find(|v| a.cross(v).norm() > 0.1).unwrap_or_default();

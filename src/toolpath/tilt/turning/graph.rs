@@ -2,7 +2,7 @@
 //! nearest place of each pass beside it.
 
 use crate::moves::touch::Touch;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, angle_between};
 use motion::{PassStretches, ROUNDING};
 use std::ops::Range;
 
@@ -45,7 +45,7 @@ impl Pair {
             (a + (axis(second) - a) * self.share).try_normalize(1e-9).unwrap_or(a)
         };
         let own = axis(self.node as usize);
-        own.cross(&there).norm().atan2(own.dot(&there))
+        angle_between(&own, &there)
     }
 }
 
