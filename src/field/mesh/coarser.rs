@@ -164,8 +164,9 @@ impl Thinned<'_> {
         }
         let mut shares: Vec<(u32, f64)> = ring.iter().map(|side| (side.vertex, 0.0)).collect();
         for &t in &self.at[v as usize] {
-            let others = self.triangles[t as usize].into_iter().filter(|&w| w != v);
-            let [a, b] = [others.clone().next().unwrap_or(v), others.last().unwrap_or(v)];
+            let corners = self.triangles[t as usize];
+            let k = corners.iter().position(|&w| w == v).unwrap_or(0);
+            let [a, b] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
             let half = (0.5 * angle_between(&self.to(v, a), &self.to(v, b))).tan();
             for w in [a, b] {
                 let distance = self.to(v, w).norm();
