@@ -69,7 +69,7 @@ pub(crate) fn shortest_streams(
             let further =
                 further.map(|values| coarse.continued((0..count).map(|v| values[own(v)]).collect()));
             let search = Search::new(coarse, task, there.as_deref(), prices);
-            let found = search.from_starts(coarse, further, monitor)?;
+            let found = search.minima_of_starts(coarse, further, monitor)?;
             let starts = found.into_iter().map(|packed| {
                 let mut values = carry.on_finer(&packed.coefficients[..carry.kept.len()]);
                 values.resize(surface.mesh.points().len(), 0.0);
@@ -79,7 +79,7 @@ pub(crate) fn shortest_streams(
             let Some(minimiser) = search.minimiser() else { return Ok(Vec::new()) };
             search.minima(&minimiser, starts.collect(), Rounds::Last, monitor)?
         }
-        None => Search::new(surface, task, toward, prices).from_starts(surface, further, monitor)?,
+        None => Search::new(surface, task, toward, prices).minima_of_starts(surface, further, monitor)?,
     };
     for packed in &mut found {
         packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
@@ -154,7 +154,7 @@ impl Search {
 
     /// To where straight passes and a further start lead: the shortest passes, or the few that promise the least
     /// time.
-    fn from_starts(
+    fn minima_of_starts(
         &self,
         surface: &MeshSurface,
         further: Option<Vec<f64>>,
