@@ -1,7 +1,8 @@
 //! The stream function with the best path on a mesh: as `shortest`, by linear elements.
 //!
 //! The gradient of linear elements jumps from triangle to triangle, so ψ is judged by recovered gradients. A
-//! little stiffness keeps it from kinks.
+//! little stiffness keeps it from kinks. Starts are followed to their minima on a mesh of fewer vertices, where a
+//! step takes an eighth of the time or less; only the few best of these are gone on with on the whole mesh.
 
 use std::f64::consts::PI;
 
