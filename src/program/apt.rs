@@ -14,7 +14,7 @@ use crate::arc::arc_tolerance;
 use crate::control::Plane;
 use crate::error::{Fault, ProgramError, Stop};
 use crate::lines::Lines;
-use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark, Unset};
 use crate::tools::{Said, cutter_of_remark, same_cutter};
 use statement::{Statement, not_understood, statement};
 
@@ -182,6 +182,7 @@ impl Reader {
             speed: 0.0,
             register: 0,
             length: [0.0; 3],
+            unset: Unset::Nothing,
             tip_kept: true,
             work: 1,
         };

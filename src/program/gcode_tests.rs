@@ -336,6 +336,27 @@ fn lengths_count_for_the_tip() {
     assert!(program.findings(&|_| None).iter().any(|found| found.kind == FindingKind::OtherLength));
 }
 
+/// The spindle stands where a length takes force or ends: the tip has not moved, and what follows moves the one
+/// tool that there is.
+#[test]
+fn a_length_that_takes_force_moves_no_tip() {
+    let tips = |text: &str| -> Vec<[f64; 3]> {
+        let program = read_with(text, &FANUC, &Setup::from_above(200.0));
+        let placing = Placing { chord: 0.01, kinematics: None, lengths: &|_| None };
+        program.runs(&placing).unwrap()[0].path.moves.iter().map(|m| m.to.tip.into()).collect()
+    };
+    let head = "T1 M6\nG10 L10 P1 R20.\nG43 H1 G0 X0 Y0 Z10.\nG1 Z1. F500\n";
+    let flat = [[0.0, 0.0, 10.0], [0.0, 0.0, 1.0], [5.0, 0.0, 1.0], [5.0, 4.0, 1.0]];
+    assert_eq!(tips(&format!("{head}G49\nG1 X5.\nY4.\nM30\n")), flat);
+    // 20 mm of tool hang below where the control takes the tip to be.
+    assert_eq!(
+        tips(&format!("{head}G49\nG0 Z15.\nG91 G28 Z0\nM30\n"))[2..],
+        [[0.0, 0.0, -5.0], [0.0, 0.0, 180.0]]
+    );
+    let before = "T1 M6\nG10 L10 P1 R20.\nG0 X3. Y0 Z90.\nG43 H1 Z10.\nG1 Z1. F500\nM30\n";
+    assert_eq!(tips(before), [[3.0, 0.0, 70.0], [3.0, 0.0, 10.0], [3.0, 0.0, 1.0]]);
+}
+
 /// The nose stands as the control lays it; the tip hangs from it by the tool's own length along the leaning
 /// axis.
 #[test]

@@ -230,13 +230,14 @@ impl Interpreter<'_> {
     }
 
     pub(super) fn setting(&self) -> Setting {
-        let State { modal, frame, register, tool, spindle, speed, .. } = &self.state;
+        let State { modal, frame, register, unset, tool, spindle, speed, .. } = &self.state;
         Setting {
             tool: *tool,
             spindle: *spindle,
             speed: *speed,
             register: *register,
             length: frame.length,
+            unset: *unset,
             tip_kept: modal.tip_kept || modal.length == Length::Tcp,
             work: frame.active as u32 + 1,
         }
