@@ -130,7 +130,7 @@ pub struct Program {
     /// How long the machine dwells, s, each before the step of an index; 0 where it only comes to rest.
     pub dwells: Vec<(usize, f64)>,
     /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to
-    /// its first place.
+    /// its first place, which may be a straight feed.
     pub approach: usize,
     /// The steps that lead X, Y and Z to their first places.
     pub first: [Option<usize>; 3],

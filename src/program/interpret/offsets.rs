@@ -210,7 +210,7 @@ impl Interpreter<'_> {
         if named {
             let over = self.target()?;
             self.go(StepKind::Rapid, over)?;
-            self.places = false;
+            self.places = [false; 6];
         }
         (0..6).filter(|k| letters[*k]).for_each(|k| self.place_axis(k));
         let mut to = self.nose();
