@@ -11,7 +11,7 @@ use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
 use crate::frame::{Place, fed_length};
-use crate::program::{Arc, Program, Setting, Step, StepKind};
+use crate::program::{Arc, Program, Setting, Spindle, Step, StepKind};
 
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
@@ -100,6 +100,7 @@ impl Program {
             run.pace = Pace { rests: run.pace.rests || rests, goes_on: false, ..Pace::default() };
             run.pace.from_unknown = k < self.approach;
             let first = run.path.len() as u32;
+            run.spins(first, setting);
             layer.follow(k, step, run).map_err(fault)?;
             run.line(first, rests);
         }
@@ -153,6 +154,20 @@ impl Run {
             turns_stray: 0.0,
             standing_s: 0.0,
             pace: Pace::default(),
+        }
+    }
+
+    /// What the spindle does from move `first` on.
+    fn spins(&mut self, first: u32, setting: &Setting) {
+        let speed = match setting.spindle {
+            Spindle::Off => 0.0,
+            Spindle::Clockwise => setting.speed,
+            Spindle::Anticlockwise => -setting.speed,
+        };
+        let spindle = &mut self.path.origin.spindle;
+        if spindle.last().is_none_or(|(_, before)| *before != speed) {
+            spindle.retain(|(from, _)| *from < first);
+            spindle.push((first, speed));
         }
     }
 
