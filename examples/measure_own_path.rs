@@ -39,7 +39,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
     let asked = Asked {
         error_bound: 1e-5,
-        stock_top: 1.0,
         most_cells: 1_000_000,
         most_squares: 1_000_000,
         is_first_look: false,

@@ -12,7 +12,8 @@ const AXIS_DECIMALS: usize = 7;
 
 /// Writes `PARTNO`, the cutter (another one, with `LOADTL`, where its moves begin), `FROM` the start of the
 /// path and one `GOTO` a move, each rapid after its own `RAPID` (which holds for one motion only), and
-/// `FEDRAT` wherever the feed changes. Numbers have four decimals, so each coordinate stands within 0.05 µm
+/// `FEDRAT` wherever the feed changes. What a program says of the spindle is written where it says so, instead
+/// of the header's speed. Numbers have four decimals, so each coordinate stands within 0.05 µm
 /// of the path. Where the tool axis is not z throughout, `MULTAX/ON` is written and every location is
 /// `x,y,z,i,j,k`.
 ///
@@ -30,8 +31,16 @@ pub fn write(
     let mut others = cutters.each().skip(1).peekable();
     load(writer, path.named_tool_of(0))?;
     writeln!(writer, "CUTTER/{}", cutter_words(cutters.first()))?;
-    if let Some(speed) = header.spindle_speed {
-        writeln!(writer, "SPINDL/{},RPM,CLW", number(speed.round()))?;
+    let from_header: Vec<(u32, f64)> =
+        header.spindle_speed.map(|speed| (0, speed.round())).into_iter().collect();
+    let said = if path.origin.spindle.is_empty() { &from_header } else { &path.origin.spindle };
+    let mut spindle = said.iter().peekable();
+    // A spindle that nobody turned on stands.
+    let mut speed = 0.0;
+    if let Some((_, begins)) = spindle.next_if(|(first, _)| *first == 0).filter(|(_, begins)| *begins != 0.0)
+    {
+        speed = *begins;
+        writeln!(writer, "{}", spindle_words(speed))?;
     }
     let upright = path.is_upright();
     if !upright {
@@ -44,9 +53,14 @@ pub fn write(
             writeln!(writer, "PPRINT {}", describe(cutter))?;
             load(writer, path.named_tool_of(k))?;
             writeln!(writer, "CUTTER/{}", cutter_words(cutter))?;
-            if let Some(speed) = header.spindle_speed {
-                writeln!(writer, "SPINDL/{},RPM,CLW", number(speed.round()))?;
+            // The change stops the spindle.
+            if speed != 0.0 && spindle.peek().is_none_or(|(first, _)| *first as usize > k) {
+                writeln!(writer, "{}", spindle_words(speed))?;
             }
+        }
+        if let Some((_, changed)) = spindle.next_if(|(first, _)| *first as usize <= k) {
+            speed = *changed;
+            writeln!(writer, "{}", spindle_words(speed))?;
         }
         if step.kind == MoveKind::Rapid {
             writeln!(writer, "RAPID")?;
@@ -56,10 +70,18 @@ pub fn write(
         }
         writeln!(writer, "GOTO/{}", location(&step.to, upright))?;
     }
-    if header.spindle_speed.is_some() {
-        writeln!(writer, "SPINDL/OFF")?;
+    if speed != 0.0 {
+        writeln!(writer, "{}", spindle_words(0.0))?;
     }
     writeln!(writer, "FINI")
+}
+
+/// A speed, rev/min, anticlockwise below 0 and off at 0.
+fn spindle_words(speed: f64) -> String {
+    match speed {
+        0.0 => "SPINDL/OFF".to_owned(),
+        _ => format!("SPINDL/{},RPM,{}", number(speed.abs()), if speed < 0.0 { "CCLW" } else { "CLW" }),
+    }
 }
 
 /// The change to a tool that has a number.

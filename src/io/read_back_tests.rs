@@ -12,7 +12,7 @@ use cutter::Cutter;
 use geometry::{Point3, Vector3, distance_to_segment};
 use machine::kinematics::{Kinematics, PRESETS, follow};
 use motion::{ClPoint, Cutters, Move, MoveKind, Toolpath};
-use program::{GENERAL_CONTROL, LINUXCNC_CONTROL, Placing, Setup, read_apt, read_gcode};
+use program::{GENERAL_CONTROL, LINUXCNC_CONTROL, Placing, Setup, Spindle, read_apt, read_gcode};
 
 fn placing(kinematics: Option<&Kinematics>) -> Placing<'_> {
     Placing { chord: 0.002, kinematics, lengths: &|_| None }
@@ -152,6 +152,47 @@ fn locations_with_and_without_axes() {
             assert_eq!(again.kind == MoveKind::Rapid, step.kind == MoveKind::Rapid);
         }
     }
+}
+
+/// What a program says of the spindle is in the locations, where it says so; the header's speed is another.
+#[test]
+fn locations_have_the_spindle_of_the_program() {
+    let text = "T1 M6\nS8000 M3\nG0 X0 Y0 Z9\nG1 Z0 F100\nS6000\nX5\nM4\nX9\nM5\nG0 Z9\nM30\n";
+    let spindle = |program: &program::Program| -> Vec<(Spindle, f64)> {
+        let steps = program.steps.iter().map(|step| program.setting(step));
+        steps
+            .map(|held| (held.spindle, if held.spindle == Spindle::Off { 0.0 } else { held.speed }))
+            .collect()
+    };
+    let read = read_gcode("a.nc", text.as_bytes(), GENERAL_CONTROL, &Setup::default()).unwrap();
+    let path = read.runs(&placing(None)).unwrap().swap_remove(0).path;
+    let mut bytes = Vec::new();
+    apt_cl::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap().into(), &header()).unwrap();
+    let again = read_apt("a.cls", &bytes).unwrap();
+    assert_eq!(spindle(&again), spindle(&read), "{}", String::from_utf8_lossy(&bytes));
+    // A tool change stops it.
+    let text = text.replace("M5\n", "T2 M6\nS5000 M3\nG0 Z8\nG1 Z0\n");
+    let read = read_gcode("a.nc", text.as_bytes(), GENERAL_CONTROL, &Setup::default()).unwrap();
+    let mut runs = read.runs(&placing(None)).unwrap().into_iter();
+    let mut all = motion::PathsInTurn::new(runs.next().unwrap().path);
+    let second = all.push(runs.next().unwrap().path, 100.0) - 2;
+    let flat = Cutter::flat(8.0).unwrap();
+    let cutters = Cutters::from(Cutter::ball(6.0).unwrap()).then(second, flat);
+    let mut bytes = Vec::new();
+    apt_cl::write(&mut bytes, &all.finish(), &cutters, &header()).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    let said: Vec<&str> =
+        text.lines().filter(|line| line.starts_with("SPINDL") || line.starts_with("LOADTL")).collect();
+    let expected = [
+        "LOADTL/1",
+        "SPINDL/8000.0,RPM,CLW",
+        "SPINDL/6000.0,RPM,CLW",
+        "SPINDL/6000.0,RPM,CCLW",
+        "LOADTL/2",
+        "SPINDL/5000.0,RPM,CLW",
+        "SPINDL/OFF",
+    ];
+    assert_eq!(said, expected);
 }
 
 #[test]

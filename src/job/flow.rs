@@ -240,6 +240,9 @@ impl Session {
         let (limits, rule) = (&scene.tolerance, &scene.scallop_rule);
         let mut claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
         judge::name_strays(&mut claims, path.origin.strays);
+        if let Some(read) = run.request.foreign() {
+            claims = figures::with_lengths_open(claims, &read.findings);
+        }
         if self.goes_on(run.request) {
             figures::before_others(claims)
         } else if run.request.foreign().is_some_and(|read| read.others) {

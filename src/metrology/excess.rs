@@ -50,8 +50,6 @@ const OTHER_KIND_SHARE: f64 = 0.25;
 /// What the highest material is sought with.
 pub(super) struct ExcessSearch<'a> {
     pub inspection: &'a Inspection<'a>,
-    /// Height of the stock's flat top, mm.
-    pub stock_top: f64,
 }
 
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
@@ -297,7 +295,8 @@ impl ExcessSearch<'_> {
     }
 
     fn patches<'b>(&'b self, least: f64, unseen: &'b [u32]) -> Patches<'b> {
-        Patches { inspection: self.inspection, stock_top: self.stock_top, least, unseen }
+        let stock_top = self.inspection.surface.cut.top;
+        Patches { inspection: self.inspection, stock_top, least, unseen }
     }
 
     /// How far off the highest place may be, mm: nearer where it is to be told from its limit.

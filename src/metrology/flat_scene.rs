@@ -46,7 +46,6 @@ pub(super) fn measured_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], 
     let cut = cut(ZMap::block(grid, top), cutter, &path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
-        stock_top: top,
         border_cuts: true,
         steep_elsewhere: false,
         most_cells: 1 << 20,

@@ -13,7 +13,7 @@ use super::figures::{
 };
 use super::inspected::inspect;
 use super::inspection::Inspection;
-use super::measured_stock::{MeasureError, check_stock};
+use super::measured_stock::{MeasureError, check_lengths, check_stock};
 use super::meetings::Meetings;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement, open_bounds};
@@ -37,7 +37,8 @@ use work::monitor::Monitor;
 /// this cutter, of stock that lies over all of the part.
 ///
 /// # Errors
-/// [`MeasureError`] where that is not so, or when the monitor says so.
+/// [`MeasureError`] where that is not so, where [`Asked::error_bound`] or [`Limits::chord`] is no length above
+/// 0, or when the monitor says so.
 pub fn measure(
     part: &Part,
     cutter: &Cutter,
@@ -47,6 +48,7 @@ pub fn measure(
     asked: &Asked,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, MeasureError> {
+    check_lengths(limits, asked)?;
     path.check_upright()?;
     check_stock(part, cutter, path, cut, monitor)?;
     Ok(measure_with_walls(part, &cutter.into(), path, cut, limits, asked, None, monitor)?)
@@ -71,7 +73,7 @@ pub(crate) fn measure_with_walls(
     let bound = asked.error_bound;
     let grid = cut.grid;
     let walls = walls_of(part, cutters, path, (&surface, limits, bound), facing, monitor)?;
-    let every_move = EveryMove::new(&surface, cutters, &up_to(part, asked.stock_top));
+    let every_move = EveryMove::new(&surface, cutters, &up_to(part, cut.top));
     let creases = Creases::new(part);
     let edges = asked.border_cuts.then(|| Borders::new(part, cutters));
     let inspection = Inspection {
@@ -117,7 +119,7 @@ pub(crate) fn measure_with_walls(
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
     inspection.cut_borders(&found.samples, &mut measured.gouge, monitor)?;
     let was_doubted = doubt(&mut measured, part, &every_move, bound);
-    let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top };
+    let search = ExcessSearch { inspection: &inspection };
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;
     measured.excess = excess;
     measured.above.extend(high);

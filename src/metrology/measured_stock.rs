@@ -1,6 +1,8 @@
 //! Whether a stock is what a path left over a part. What a measurement reads from cells and what it asks
 //! moves for would contradict each other elsewhere.
 
+use super::figures::Limits;
+use super::refine::Asked;
 use cutter::Cutter;
 use geometry::Point2;
 use motion::{PathError, Toolpath};
@@ -59,6 +61,24 @@ pub enum MeasureError {
         /// Moves that cut the cells.
         moves: usize,
     },
+    /// The top of the stock is no number, or the stock stands higher.
+    #[error("at x {:.3} y {:.3} the stock is {stands} mm high, and its top, {top} mm, is said to be the highest of it", at.x, at.y)]
+    Top {
+        /// Centre of a cell.
+        at: Point2,
+        /// Height of the stock there, mm.
+        stands: f32,
+        /// What the stock says of its top, mm.
+        top: f64,
+    },
+    /// A length that must be above 0 is not.
+    #[error("`{key}` must be a length above 0 mm, and is {value}")]
+    Length {
+        /// The field that has it.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// The stock does not stand as high as this path leaves it.
     #[error(
         "at x {:.3} y {:.3} the stock is {stands} mm high, and move {move_index} of the path leaves {leaves:.6} mm; cut the stock along \
@@ -93,8 +113,19 @@ impl From<CutError> for MeasureError {
     }
 }
 
+/// Whether the lengths that a measurement goes by are lengths.
+pub(super) fn check_lengths(limits: &Limits, asked: &Asked) -> Result<(), MeasureError> {
+    for (key, value) in [("Asked.error_bound", asked.error_bound), ("Limits.chord", limits.chord)] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(MeasureError::Length { key, value });
+        }
+    }
+    Ok(())
+}
+
 /// Whether `cut` lies over the part and is what the path left: every cell stands where the move that it names
-/// cuts, or above the part where it names none, and none higher than the middle of any move.
+/// cuts, or above the part where it names none, none higher than the middle of any move, and none above the
+/// stock's top.
 pub(super) fn check_stock(
     part: &Part,
     cutter: &Cutter,
@@ -131,17 +162,23 @@ pub(super) fn check_stock(
         let lies_over = f64::from(stands) >= design - rounding;
         (!lies_over).then_some(MeasureError::Below { at, stands, design })
     };
+    let most = cut.top + HEIGHTS + f64::from(f32::EPSILON) * cut.top.abs();
+    let over_top = |k: usize| {
+        let (at, stands) = (grid.centre(k % grid.nx, k / grid.nx), cut.height[k]);
+        let is_within = f64::from(stands) <= most && cut.top.is_finite();
+        (!is_within).then_some(MeasureError::Top { at, stands, top: cut.top })
+    };
     parallel::try_map(grid.ny, |j| {
         monitor::check(monitor)?;
         (j * grid.nx..(j + 1) * grid.nx).try_for_each(|k| {
             if cut.cut_by[k] == NOT_CUT {
-                return below(k).map_or(Ok(()), Err);
+                return below(k).or_else(|| over_top(k)).map_or(Ok(()), Err);
             }
             let move_index = cut.cut_by[k] as usize;
             if move_index >= path.len() {
                 return Err(MeasureError::OtherPath { move_index, moves: path.len() });
             }
-            differs(k, move_index, true).map_or(Ok(()), Err)
+            differs(k, move_index, true).or_else(|| over_top(k)).map_or(Ok(()), Err)
         })
     })?;
     monitor::check(monitor)?;
@@ -181,7 +218,7 @@ fn middle_within([from, to]: [Point2; 2], [low, high]: [Point2; 2]) -> Option<Po
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Asked, Limits, Measurement, measure};
+    use crate::{Measurement, measure};
     use geometry::{AnalyticShape, AnalyticSurface, Point3, Vector3};
     use motion::{ClPoint, Move, MoveKind};
     use part::Patch;
@@ -213,18 +250,19 @@ mod tests {
         Toolpath::new(tip(-4.0, 0.0, 5.0), moves)
     }
 
+    const LIMITS: Limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
+
+    const ASKED: Asked = Asked {
+        error_bound: 1e-5,
+        most_cells: 1_000_000,
+        most_squares: 1_000_000,
+        is_first_look: false,
+        border_cuts: true,
+        steep_elsewhere: false,
+    };
+
     fn measured(path: &Toolpath, stock: &ZMap) -> Result<Measurement, MeasureError> {
-        let limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
-        let asked = Asked {
-            error_bound: 1e-5,
-            stock_top: 1.0,
-            most_cells: 1_000_000,
-            most_squares: 1_000_000,
-            is_first_look: false,
-            border_cuts: true,
-            steep_elsewhere: false,
-        };
-        measure(&plate(), &Cutter::ball(6.0).unwrap(), path, stock, &limits, &asked, &Silent)
+        measure(&plate(), &Cutter::ball(6.0).unwrap(), path, stock, &LIMITS, &ASKED, &Silent)
     }
 
     fn cut_by(cutter: &Cutter, path: &Toolpath) -> ZMap {
@@ -325,6 +363,40 @@ mod tests {
             let error = measured(&path(), &stock).err();
             let is_below = matches!(error, Some(MeasureError::Below { design: 0.0, .. }));
             assert_eq!((is_below, error.is_none()), (!lies_over, lies_over), "{top}: {error:?}");
+        }
+    }
+
+    /// One pass along the border of a plate: what stands along the other one is known by where the stock's top
+    /// is, which the stock says itself.
+    #[test]
+    fn the_top_of_the_stock_bounds_what_one_pass_leaves() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        let mut one = path();
+        one.moves.truncate(2);
+        let stands = 3.0 - 8f64.sqrt();
+        let limits = Limits { scallop: 0.17157, uncut: 0.5, ..LIMITS };
+        let stock = cut_by(&cutter, &one);
+        let found = measure(&plate(), &cutter, &one, &stock, &limits, &ASKED, &Silent).unwrap();
+        let highest = found.excess.highest;
+        assert!((highest.max_mm - stands).abs() <= highest.error_bound_mm, "{highest:?} {stands}");
+        for top in [0.0, 0.03, -1.0, f64::NAN, f64::INFINITY] {
+            let error = measured(&one, &ZMap { top, ..stock.clone() }).err();
+            assert!(matches!(error, Some(MeasureError::Top { .. })), "{top}: {error:?}");
+        }
+    }
+
+    #[test]
+    fn lengths_that_are_none_are_refused_by_their_names() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        let stock = cut_by(&cutter, &path());
+        for value in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+            let (limits, asked) = (Limits { chord: value, ..LIMITS }, Asked { error_bound: value, ..ASKED });
+            for (limits, asked, key) in
+                [(&limits, &ASKED, "`Limits.chord`"), (&LIMITS, &asked, "`Asked.error_bound`")]
+            {
+                let error = measure(&plate(), &cutter, &path(), &stock, limits, asked, &Silent).unwrap_err();
+                assert!(error.to_string().starts_with(key), "{value}: {error}");
+            }
         }
     }
 

@@ -283,7 +283,6 @@ mod tests {
             let cut = cut(ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
             let asked = Asked {
                 error_bound: 5e-4,
-                stock_top: 1.0,
                 border_cuts: true,
                 steep_elsewhere: false,
                 most_cells: 1 << 20,

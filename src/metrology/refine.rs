@@ -38,8 +38,6 @@ const MOST_RECTANGLES: usize = 256;
 pub struct Asked {
     /// Error bound of the highest scallop, the deepest gouge and the highest uncut place, mm.
     pub error_bound: f64,
-    /// Height of the stock's flat top before the cut, mm.
-    pub stock_top: f64,
     /// Whether cuts beside the part's borders are looked for. Beside the floor of a pocket stand its walls,
     /// which tell theirs.
     pub border_cuts: bool,
@@ -177,7 +175,7 @@ impl Refinement<'_> {
                 let design = self.coarse.part.highest_at(q.x, q.y);
                 let shape = self.coarse.surface.cut.shape.as_ref();
                 let within = |shape: &Shape| shape.highest_within(q.x, q.y, self.coarse.grid.cell);
-                let top = shape.map_or(self.asked.stock_top, within);
+                let top = shape.map_or(self.coarse.surface.cut.top, within);
                 (q, design.map_or(0.0, |d| (top - d.point.z) * d.normal.z))
             }
         }
@@ -274,7 +272,7 @@ impl Refinement<'_> {
     /// What is measured on a fine grid, and how high material may be that its cells missed as well.
     fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), CutError> {
         let (coarse, within) = (self.coarse, Within(monitor));
-        let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top, &within)?;
+        let stock = coarse.surface.cut.uncut(fine, &within)?;
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let surface = coarse.surface.with_cut(&cut);
         let meetings = &Meetings::new(&surface, coarse.cutters, self.path, None);

@@ -81,14 +81,14 @@ pub(super) fn ridge_map(
 
 /// What stands above the scallop limit, or would by the last decimals of a program, also between the places
 /// that a map of ridges holds: one place of each cell that a ridge near the limit crosses, or that lies along
-/// a border, with the height that it may have at most. `stock_top` is the height of the stock's flat top, mm.
+/// a border, with the height that it may have at most.
 pub(super) fn places_above(
     part: &Part,
     cutters: &Cutters,
     path: &Toolpath,
     cut: &ZMap,
     limits: &Limits,
-    (stock_top, most_squares): (f64, usize),
+    most_squares: usize,
     monitor: &dyn Monitor,
 ) -> Result<Vec<RidgePlace>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
@@ -96,7 +96,7 @@ pub(super) fn places_above(
     let inspection = on_cells(part, cutters, limits, NUMERICAL_FLOOR, &surface, &meetings);
     let inspection = Inspection { most_squares, ..inspection };
     let samples = inspection.samples(monitor)?;
-    let search = ExcessSearch { inspection: &inspection, stock_top };
+    let search = ExcessSearch { inspection: &inspection };
     // A ridge rises by little from a line of cells to the next, but where it ends.
     let ridges = RidgeFinder::new(&inspection, path).find(&|k| samples[k].deviation, monitor)?;
     let grid = cut.grid;
@@ -321,7 +321,7 @@ mod tests {
         let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
         let map = ridge_map(&part, &ball.into(), &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
         assert!(map.above.iter().all(|place| place.height < limits.scallop), "{map:?}");
-        let found = places_above(&part, &ball.into(), &path, &cut, &limits, (1.0, 1 << 16), &Silent).unwrap();
+        let found = places_above(&part, &ball.into(), &path, &cut, &limits, 1 << 16, &Silent).unwrap();
         // Over the middle, the raised pass cuts where its rise and the way there together leave least.
         let of_raised = |far: f64| {
             let ways = (0..=4000).map(|k| f64::from(k) * 1e-5);

@@ -17,7 +17,6 @@ const TOP: f64 = 2.0;
 
 const ASKED: Asked = Asked {
     error_bound: 5e-4,
-    stock_top: TOP,
     border_cuts: true,
     steep_elsewhere: false,
     most_cells: 1 << 20,

@@ -40,6 +40,9 @@ impl PathsInTurn {
             }
         }
         let begin = path.moves.len() as u32;
+        // What the next path begins with holds on the way there.
+        let turned = |(k, speed): &(u32, f64)| (if *k > 0 { k + begin } else { first }, *speed);
+        path.origin.spindle.extend(next.origin.spindle.iter().map(turned));
         let behind = |range: &Range<u32>| range.start + begin..range.end + begin;
         path.origin.approaches.push(begin - 3..begin);
         path.origin.approaches.extend(next.origin.approaches.iter().map(behind));
@@ -87,6 +90,7 @@ mod tests {
             path.origin.strays = 1e-3 * top;
             path.origin.pieces.push(0..2);
             path.origin.stops.push(1);
+            path.origin.spindle.push((1, 100.0 * top));
             path
         };
         let mut all = PathsInTurn::new(path(1, 5.0));
@@ -100,6 +104,8 @@ mod tests {
         assert_eq!(all.origin.lines, [10, 11, 20, 20, 20, 20, 21, 20, 20, 20, 20, 21]);
         assert_eq!(all.origin.tools, [(0, 1), (3, 2)]);
         assert_eq!(all.origin.approaches, [2..5, 7..10]);
+        assert_eq!(all.origin.spindle, [(1, 500.0), (6, 700.0), (11, 300.0)]);
+        assert_eq!(all.part(7..12).origin.spindle, [(0, 700.0), (4, 300.0)]);
         assert_eq!(
             (&all.origin.pieces[..], &all.origin.stops[..]),
             (&[0..2, 5..7, 10..12][..], &[1, 6, 11][..])

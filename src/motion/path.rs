@@ -86,6 +86,9 @@ pub struct Origin {
     pub program: String,
     /// The first moves of the tools and their numbers, in order; empty where no program names one.
     pub tools: Vec<(u32, u32)>,
+    /// What the spindle does from a move on, rev/min, anticlockwise below 0 and off at 0, in order; empty where
+    /// no program says it.
+    pub spindle: Vec<(u32, f64)>,
     /// The line of each move, counted from 1; empty where there is no program.
     pub lines: Vec<u32>,
     /// How far its motion may be off these moves, mm, where arcs and turns are moves here.
@@ -155,18 +158,25 @@ impl Toolpath {
     /// Some of its moves, as a path that begins where they do.
     pub fn part(&self, moves: Range<usize>) -> Self {
         let lines = self.origin.lines.get(moves.clone()).unwrap_or_default().to_vec();
-        let before = self.origin.tools.partition_point(|(first, _)| *first as usize <= moves.start);
-        let shown = self.origin.tools.get(before.saturating_sub(1)..).unwrap_or_default().iter();
-        let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
-        let tools = within.map(|(first, tool)| (first.saturating_sub(moves.start as u32), *tool)).collect();
+        let (tools, spindle) = (shown(&self.origin.tools, &moves), shown(&self.origin.spindle, &moves));
         let program = self.origin.program.clone();
         let [pieces, approaches] =
             [&self.origin.pieces, &self.origin.approaches].map(|ranges| clipped(ranges, &moves));
         let stops = self.origin.stops.iter().filter(|k| moves.contains(&(**k as usize)));
         let stops = stops.map(|k| k - moves.start as u32).collect();
         let Origin { strays, leans, .. } = self.origin;
-        let origin =
-            Origin { program, tools, lines, strays, standing_s: 0.0, pieces, stops, approaches, leans };
+        let origin = Origin {
+            program,
+            tools,
+            spindle,
+            lines,
+            strays,
+            standing_s: 0.0,
+            pieces,
+            stops,
+            approaches,
+            leans,
+        };
         Self { start: self.location_before(moves.start), moves: self.moves[moves].to_vec(), origin }
     }
 
@@ -213,6 +223,14 @@ impl Toolpath {
     pub fn passes(&self) -> usize {
         self.moves.iter().map(|m| m.pass as usize + 1).max().unwrap_or(0)
     }
+}
+
+/// What of what holds from a move on does so within some moves, counted from their first.
+fn shown<T: Copy>(from: &[(u32, T)], moves: &Range<usize>) -> Vec<(u32, T)> {
+    let before = from.partition_point(|(first, _)| *first as usize <= moves.start);
+    let shown = from.get(before.saturating_sub(1)..).unwrap_or_default().iter();
+    let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
+    within.map(|(first, what)| (first.saturating_sub(moves.start as u32), *what)).collect()
 }
 
 /// What of ranges of moves lies within some moves, counted from their first.

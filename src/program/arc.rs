@@ -29,6 +29,7 @@ impl Interpreter<'_> {
     pub fn arc(&mut self, clockwise: bool) -> Result<(), Stop> {
         let [u, v, w] = self.plane_axes();
         let start = self.state.at;
+        self.note_unknown_start([u, v]);
         let column =
             AXES.iter().filter(|a| self.block.peek(**a).is_some()).map(|a| self.block.column(*a)).min();
         let to = self.target()?;
@@ -59,6 +60,14 @@ impl Interpreter<'_> {
         let normal = self.state.frame.direction(w).map(|x| sense * x);
         let plane = self.state.modal.plane;
         self.arc_to(Arc { centre: [placed[0], placed[1], placed[2]], normal, sweep, plane }, to, feed)
+    }
+
+    /// An arc goes by where it begins, which no program says that begins with one.
+    fn note_unknown_start(&mut self, axes: [usize; 2]) {
+        if axes.iter().any(|axis| !self.is_placed(*axis)) {
+            let [u, v] = axes.map(|axis| format!("{}{:.4}", char::from(AXES[axis]), self.state.at[axis]));
+            self.note(format!("an arc begins where nobody knows; it is taken to begin at {u} {v}"));
+        }
     }
 
     fn check_radii(&self, start: f64, end: f64, column: usize) -> Result<(), Stop> {

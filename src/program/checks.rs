@@ -1,7 +1,7 @@
 //! What is wrong with a program before anything is cut: feeds without a spindle, without a feed, without a
-//! tool, with the length of another tool, and a text that breaks off.
+//! tool, with the length of another tool or with several lengths, and a text that breaks off.
 
-use crate::program::{Program, Setting, Spindle, StepKind};
+use crate::program::{Program, Setting, Spindle, Step, StepKind, Unset};
 
 /// What a check found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,6 +14,8 @@ pub enum FindingKind {
     NoTool,
     /// The length of another tool is in force.
     OtherLength,
+    /// A tool feeds under several lengths, and which of them is its own is not known.
+    SeveralLengths,
     /// The text ends without M2, M30 or a closing mark.
     NoEnd,
 }
@@ -26,11 +28,12 @@ impl FindingKind {
             Self::NoFeed => "no feed",
             Self::NoTool => "no tool",
             Self::OtherLength => "tool length",
+            Self::SeveralLengths => "tool lengths",
             Self::NoEnd => "no end",
         }
     }
 
-    /// Whether it spoils the part or the tool; else it is a warning.
+    /// Whether it spoils the part or the tool, or may do so; else it is a warning.
     pub fn is_violation(self) -> bool {
         self != Self::NoEnd
     }
@@ -60,10 +63,7 @@ impl Program {
     pub fn findings(&self, lengths: &dyn Fn(u32) -> Option<f64>) -> Vec<Finding> {
         let mut found: Vec<Finding> = Vec::new();
         let named = self.settings.iter().any(|setting| setting.tool > 0);
-        for step in &self.steps {
-            if !matches!(step.kind, StepKind::Feed | StepKind::Arc(_)) {
-                continue;
-            }
+        for step in self.steps.iter().filter(|step| step.feeds()) {
             let setting = self.setting(step);
             let spins = setting.spindle != Spindle::Off && setting.speed > 0.0;
             let other = setting.register > 0 && setting.tool > 0 && setting.register != setting.tool;
@@ -80,6 +80,7 @@ impl Program {
                 }
             }
         }
+        self.several_lengths(lengths, &mut found);
         if !self.ended && self.lines > 0 {
             let text = "the text ends without M2, M30 or %; it may be cut off".to_owned();
             let line = self.lines as u32;
@@ -89,19 +90,61 @@ impl Program {
         found
     }
 
+    /// A tool has one length from its change to the next: where it feeds under two, the tip is not where the
+    /// control takes it to be under one of them. A known length is compared with each.
+    fn several_lengths(&self, lengths: &dyn Fn(u32) -> Option<f64>, found: &mut Vec<Finding>) {
+        let mut first: Option<(&Step, &Setting)> = None;
+        for step in self.steps.iter().filter(|step| step.kind != StepKind::Set) {
+            let setting = self.setting(step);
+            first = first.filter(|(_, first)| first.tool == setting.tool);
+            if !step.feeds() || lengths(setting.tool).is_some() {
+                continue;
+            }
+            let (before, taken) = *first.get_or_insert((step, setting));
+            let apart = (0..3).any(|k| (taken.length[k] - setting.length[k]).abs() > SAME_LENGTH);
+            if apart || taken.unset != setting.unset {
+                let (line, tool, other) = (step.line, setting.tool, before.line);
+                let text = || {
+                    let [now, then] = [setting, taken].map(by_length);
+                    format!("line {line} feeds tool {tool} {now}, and line {other} {then}")
+                };
+                push(found, FindingKind::SeveralLengths, line, tool, text);
+            }
+        }
+    }
+
     /// Locations by APT may say nothing of a spindle; a program of G-code has to.
     fn spins_at_all(&self) -> bool {
         self.axes.is_empty() || self.settings.iter().any(|setting| setting.spindle != Spindle::Off)
     }
 }
 
+/// What a feed takes the tool's length for.
+fn by_length(setting: &Setting) -> String {
+    let [x, y, z] = setting.length;
+    let aside = if x == 0.0 && y == 0.0 { String::new() } else { format!(" and X{x:.4} Y{y:.4} aside") };
+    let more = if z == 0.0 { String::new() } else { format!(" and {z:.4} mm") };
+    match setting.unset {
+        Unset::Nothing => format!("as if it were {z:.4} mm long{aside}"),
+        Unset::Plus(register) => format!("by the length in H{register}, which nothing sets{more}{aside}"),
+        Unset::Minus(register) => {
+            format!("by the length in H{register} taken off, which nothing sets{more}{aside}")
+        }
+        Unset::Sum(line) => format!("by the sum of lengths in line {line}, which nothing sets{aside}"),
+    }
+}
+
+/// Counts a motion for a finding, or notes it as the first one.
+fn push(found: &mut Vec<Finding>, kind: FindingKind, line: u32, tool: u32, text: impl FnOnce() -> String) {
+    match found.iter_mut().find(|known| known.kind == kind && known.tool == tool) {
+        Some(known) => known.motions += 1,
+        None => found.push(Finding { kind, line, tool, motions: 1, text: text() }),
+    }
+}
+
 fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Setting, known: Option<f64>) {
     let tool = setting.tool;
-    if let Some(known) = found.iter_mut().find(|known| known.kind == kind && known.tool == tool) {
-        known.motions += 1;
-        return;
-    }
-    let text = match kind {
+    let text = || match kind {
         FindingKind::SpindleOff => format!("line {line} feeds while the spindle is off"),
         FindingKind::NoFeed => format!("line {line} feeds and no F was given"),
         FindingKind::NoTool => format!("line {line} feeds before the first tool change (M6)"),
@@ -114,9 +157,9 @@ fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Settin
                 format!("line {line} feeds tool {tool} with the length of register H{}", setting.register)
             }
         },
-        FindingKind::NoEnd => String::new(),
+        FindingKind::SeveralLengths | FindingKind::NoEnd => String::new(),
     };
-    found.push(Finding { kind, line, tool, motions: 1, text });
+    push(found, kind, line, tool, text);
 }
 
 #[cfg(test)]
@@ -137,7 +180,72 @@ mod tests {
         assert_eq!(kinds(&sound.replace(" F100", "")), [(FindingKind::NoFeed, 5)]);
         assert_eq!(kinds(&sound.replace("H1", "H2")), [(FindingKind::OtherLength, 5)]);
         assert_eq!(kinds(&sound.replace("M30\n", "")), [(FindingKind::NoEnd, 6)]);
+        assert_eq!(kinds(&sound.replace("X2", "G49 X2")), [(FindingKind::SeveralLengths, 6)]);
         let late = "S1000 M3\nG1 X1 F100\nT1 M6\nM3\nG1 X2\nM30\n";
         assert_eq!(kinds(late), [(FindingKind::NoTool, 2)]);
+    }
+
+    /// What a control reads of a program whose tool feeds under H1, and then does `then`.
+    fn texts(then: &str, control: &'static crate::Control, known: Option<f64>) -> Vec<String> {
+        let text = format!("T1 M6\nS1000 M3\nG43 H1\nG0 X1 Y1 Z50\nG1 Z-1 F100\n{then}\nM30\n");
+        let program = read_gcode("a.nc", text.as_bytes(), control, &Setup::default()).unwrap();
+        program.findings(&|_| known).into_iter().map(|found| found.text).collect()
+    }
+
+    #[test]
+    fn a_tool_that_feeds_under_two_lengths_is_found() {
+        let set = "G10 L10 P1 R20.\nG43 H1\nG1 X3\n";
+        let fanuc = |then: &str| {
+            texts(
+                &format!("T2 M6\nM3\n{set}{then}").replace("H1", "H2").replace("P1", "P2"),
+                control("fanuc"),
+                None,
+            )
+        };
+        let first = "line 10 as if it were 20.0000 mm long";
+        for (then, now) in [
+            ("G49\nG1 Z15.", "line 12 feeds tool 2 as if it were 0.0000 mm long"),
+            ("G49\nG2 X4 I.5", "line 12 feeds tool 2 as if it were 0.0000 mm long"),
+            ("G49\nG81 Z-1. R2.", "line 12 feeds tool 2 as if it were 0.0000 mm long"),
+            ("G43 H0\nG1 Z15.", "line 12 feeds tool 2 as if it were 0.0000 mm long"),
+            ("G44 H1\nG1 Z15.", "line 12 feeds tool 2 as if it were -20.0000 mm long"),
+            ("G10 L11 P1 R-.02\nG43 H1\nG1 Z15.", "line 13 feeds tool 2 as if it were 19.9800 mm long"),
+            ("G10 L10 P1 R15.\nG43 H1\nG1 Z15.", "line 13 feeds tool 2 as if it were 15.0000 mm long"),
+            ("G49\nM98 P9\nM30\nO9\nG1 Z15.\nM99", "line 15 feeds tool 2 as if it were 0.0000 mm long"),
+        ] {
+            assert_eq!(fanuc(then), [format!("{now}, and {first}")], "{then}");
+        }
+        let linuxcnc = |then: &str| texts(then, control("linuxcnc"), None);
+        let unset = "line 5 by the length in H1, which nothing sets";
+        for (then, now) in [
+            ("G49\nG1 Z15", "line 7 feeds tool 1 as if it were 0.0000 mm long"),
+            ("G43.1 Z-5\nG1 Z1", "line 7 feeds tool 1 as if it were -5.0000 mm long"),
+            ("G10 L1 P1 Z20\nG43 H1\nG1 Z1", "line 8 feeds tool 1 as if it were 20.0000 mm long"),
+            ("G43.2 H1\nG1 Z1", "line 7 feeds tool 1 by the sum of lengths in line 6, which nothing sets"),
+        ] {
+            assert_eq!(linuxcnc(then), [format!("{now}, and {unset}")], "{then}");
+        }
+    }
+
+    #[test]
+    fn one_length_and_what_does_not_feed_under_another_is_no_finding() {
+        for then in [
+            "G43 H1\nG1 X2",
+            "H1\nG1 X2",
+            "G49\nG0 Z90\nG91 G28 Z0\nG90 G43 H1\nG0 Z5\nG1 Z0",
+            "G49\nT2 M6\nM3\nG1 X2",
+            "G10 L10 P2 R15.\nG1 X2",
+        ] {
+            assert_eq!(texts(then, control("fanuc"), None), Vec::<String>::new(), "{then}");
+        }
+        assert_eq!(kinds("T1 M6\nS1 M3\nG0 X1 Y1 Z5\nG1 Z-1 F100\nG49 X2\nM30\n"), []);
+        // A length that is known is compared with each.
+        let known = texts("G10 L10 P1 R20.\nG43 H1\nG1 X2\nG49\nG1 X3", control("fanuc"), Some(20.0));
+        assert_eq!(known.len(), 1);
+        assert!(known[0].contains("the table of tools has 20.0000 mm"), "{known:?}");
+    }
+
+    fn control(word: &str) -> &'static crate::Control {
+        crate::Control::from_word(word).unwrap()
     }
 }

@@ -171,6 +171,11 @@ fn until_a_place_is_known_the_tool_is_above_all_of_the_program() {
     // The tool goes down where it is said to, and feeds from where it is.
     assert_eq!(led("G0 X9 Y3\nZ-5\nG1 X0 F9\nM30\n")[1..3], [[9.0, 3.0, 200.0], [9.0, 3.0, -5.0]]);
     assert_eq!(led("G0 Z5\nG1 X9 F9\nG0 Y3\nM30\n")[1], [0.0, 0.0, 5.0]);
+    // A feed to the first place comes straight down on it, however far away that is.
+    assert_eq!(
+        led("G1 X9e4 Y3 Z5 F9\nX0\nM30\n".replace("9e4", "90000").as_str())[..2],
+        [[9e4, 3.0, 200.0], [9e4, 3.0, 5.0]]
+    );
 }
 
 #[test]
@@ -184,6 +189,16 @@ fn the_way_from_where_nobody_knows_is_told() {
     // Wherever it begins, a step is known.
     assert_eq!(approaches("G91 G0 X5 Y1 Z1\nG90 X9\nG1 X2 F9\nM30\n"), [1, 2]);
     assert_eq!(approaches("G91 G0 X5 Y1 Z1\nG1 X2 F9\nM30\n"), []);
+    // So is a feed to the first place of all.
+    assert_eq!(approaches("G1 X5 Y1 Z2 F9\nX9\nG0 Z10\nM30\n"), [1]);
+    assert_eq!(approaches("G0 X5 Y1\nG1 Z2 F9\nX9\nM30\n"), [1, 2]);
+    assert_eq!(approaches("G0 Z2\nG1 X5 Y1 F9\nX9\nM30\n"), [1, 2]);
+    let noted = read("G1 X5 Y1 Z2 F9\nX9\nM30\n").notes;
+    assert!(noted.iter().any(|note| note.line == 1 && note.text.contains("from where nobody knows")));
+    assert_eq!(approaches("G81 X5 Y1 Z-2 R1 F9\nX9\nM30\n"), [1, 1]);
+    let arc = read("G2 X4 Y0 I2 F9\nG3 X0 I-2\nM30\n").notes;
+    assert!(arc.len() == 1 && arc[0].text.ends_with("taken to begin at X0.0000 Y0.0000"), "{arc:?}");
+    assert!(read("G0 X0 Y0\nG2 X4 I2 F9\nM30\n").notes.is_empty());
     // What feeds from there is not left out.
     assert_eq!(approaches("G1 X5 F9\nG0 Z10\nM30\n"), []);
 }
@@ -334,6 +349,27 @@ fn lengths_count_for_the_tip() {
     assert_eq!(tips(&placing(&true_lengths)), [11.0, 0.0, 120.0]);
     assert_eq!(program.findings(&|_| None)[0].kind, FindingKind::SpindleOff);
     assert!(program.findings(&|_| None).iter().any(|found| found.kind == FindingKind::OtherLength));
+}
+
+/// The spindle stands where a length takes force or ends: the tip has not moved, and what follows moves the one
+/// tool that there is.
+#[test]
+fn a_length_that_takes_force_moves_no_tip() {
+    let tips = |text: &str| -> Vec<[f64; 3]> {
+        let program = read_with(text, &FANUC, &Setup::from_above(200.0));
+        let placing = Placing { chord: 0.01, kinematics: None, lengths: &|_| None };
+        program.runs(&placing).unwrap()[0].path.moves.iter().map(|m| m.to.tip.into()).collect()
+    };
+    let head = "T1 M6\nG10 L10 P1 R20.\nG43 H1 G0 X0 Y0 Z10.\nG1 Z1. F500\n";
+    let flat = [[0.0, 0.0, 10.0], [0.0, 0.0, 1.0], [5.0, 0.0, 1.0], [5.0, 4.0, 1.0]];
+    assert_eq!(tips(&format!("{head}G49\nG1 X5.\nY4.\nM30\n")), flat);
+    // 20 mm of tool hang below where the control takes the tip to be.
+    assert_eq!(
+        tips(&format!("{head}G49\nG0 Z15.\nG91 G28 Z0\nM30\n"))[2..],
+        [[0.0, 0.0, -5.0], [0.0, 0.0, 180.0]]
+    );
+    let before = "T1 M6\nG10 L10 P1 R20.\nG0 X3. Y0 Z90.\nG43 H1 Z10.\nG1 Z1. F500\nM30\n";
+    assert_eq!(tips(before), [[3.0, 0.0, 70.0], [3.0, 0.0, 10.0], [3.0, 0.0, 1.0]]);
 }
 
 /// The nose stands as the control lays it; the tip hangs from it by the tool's own length along the leaning

@@ -85,10 +85,11 @@ pub(crate) struct Interpreter<'a> {
     moved: bool,
     /// It has fed.
     fed: bool,
-    /// The axes that have been led to a place, and whether this block is the first one that does so with one
-    /// of them.
+    /// The axes that have been led to a place, and those with which this block is the first one that does so.
     placed: [bool; 6],
-    places: bool,
+    places: [bool; 6],
+    /// The feed at hand leads to the first place of all.
+    feeds_in: bool,
     most_repeats: u64,
     /// The cutter's radius, while it is compensated.
     pub compensation: Option<Compensation>,
@@ -123,7 +124,8 @@ impl<'a> Interpreter<'a> {
             moved: false,
             fed: false,
             placed: [false; 6],
-            places: false,
+            places: [false; 6],
+            feeds_in: false,
             most_repeats: setup.most_repeats,
             compensation: None,
             shift: 0,
@@ -237,7 +239,7 @@ impl<'a> Interpreter<'a> {
             return Ok(Next::Line);
         }
         self.block.take(b'N');
-        self.places = false;
+        self.places = [false; 6];
         let mut asked = Asked::default();
         let unit_before = self.state.modal.unit;
         if !self.block.g.as_slice().is_empty() {

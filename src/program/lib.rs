@@ -46,7 +46,7 @@ pub use control::{
 pub use error::{Fault, ProgramError};
 pub use frame::{Place, WORK_OFFSETS};
 pub use interpret::read_gcode;
-pub use program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+pub use program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark, Unset};
 pub use runs::{FEED_WHERE_NONE, Placing, ToolRun};
 pub use state::Setup;
 pub use tools::{Described, TableTool, Tool, ToolTable, read_tool_table, same_cutter};

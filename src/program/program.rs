@@ -31,6 +31,13 @@ pub struct Step {
     pub setting: u32,
 }
 
+impl Step {
+    /// Whether the tool moves at feed.
+    pub fn feeds(&self) -> bool {
+        matches!(self.kind, StepKind::Feed | StepKind::Arc(_))
+    }
+}
+
 /// An exact arc, in machine coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
@@ -56,6 +63,20 @@ pub enum Spindle {
     Anticlockwise,
 }
 
+/// What of a tool's length nobody knows: it is in a register that neither the program nor a table sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Unset {
+    /// All of it is known.
+    #[default]
+    Nothing,
+    /// The register's value.
+    Plus(u32),
+    /// The same, the other way (G44).
+    Minus(u32),
+    /// A sum of registers, taken in this line (G43.2).
+    Sum(u32),
+}
+
 /// What holds during some steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Setting {
@@ -67,8 +88,10 @@ pub struct Setting {
     pub speed: f64,
     /// The register of the tool's length; 0 without one.
     pub register: u32,
-    /// What the control takes the length for, mm.
+    /// What the control takes the length for, mm, less what is `unset`.
     pub length: [f64; 3],
+    /// What comes to that from a register whose value is not known.
+    pub unset: Unset,
     /// Whether the control keeps the tip on its way while rotary axes turn.
     pub tip_kept: bool,
     /// Work offset, from 1 for G54.
@@ -107,7 +130,7 @@ pub struct Program {
     /// How long the machine dwells, s, each before the step of an index; 0 where it only comes to rest.
     pub dwells: Vec<(usize, f64)>,
     /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to
-    /// its first place.
+    /// its first place, which may be a straight feed.
     pub approach: usize,
     /// The steps that lead X, Y and Z to their first places.
     pub first: [Option<usize>; 3],
@@ -152,9 +175,8 @@ impl Program {
         if last >= *approach {
             return self;
         }
-        let is_fed = |step: &Step| matches!(step.kind, StepKind::Feed | StepKind::Arc(_));
         let (led, behind) = steps.split_at(last + 1);
-        let seen = led.iter().chain(behind.iter().filter(|step| is_fed(step)));
+        let seen = led.iter().chain(behind.iter().filter(|step| step.feeds()));
         let height = seen.map(|step| step.to[2]).fold(start[2], f64::max);
         let over = [steps[x].to[0], steps[y].to[1], height];
         start[2] = height;
@@ -194,9 +216,8 @@ impl Program {
     /// turns, the feed is that of no single axis.
     pub fn highest_feed(&self, of_tool: impl Fn(u32) -> bool) -> Option<(f64, u32)> {
         let fed = |(k, step): (usize, &Step)| {
-            let feeds = matches!(step.kind, StepKind::Feed | StepKind::Arc(_));
             let turns = self.start_of(k)[3..] != step.to[3..];
-            (feeds && !turns && of_tool(self.setting(step).tool)).then_some((step.feed, step.line))
+            (step.feeds() && !turns && of_tool(self.setting(step).tool)).then_some((step.feed, step.line))
         };
         self.steps.iter().enumerate().filter_map(fed).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
     }

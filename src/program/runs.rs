@@ -11,7 +11,7 @@ use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
 use crate::frame::{Place, fed_length};
-use crate::program::{Arc, Program, Setting, Step, StepKind};
+use crate::program::{Arc, Program, Setting, Spindle, Step, StepKind};
 
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
@@ -41,7 +41,8 @@ pub struct Placing<'a> {
     pub chord: f64,
     /// The machine, where it has rotary axes. Its gauge length is that of tools whose length is not known.
     pub kinematics: Option<&'a Kinematics>,
-    /// The true length of a tool, mm, where it is known.
+    /// The true length of a tool, mm, where it is known. Else a tool is taken to be as long as the control
+    /// takes it to be where it first feeds after its change: its one length under all that it does.
     pub lengths: &'a dyn Fn(u32) -> Option<f64>,
 }
 
@@ -72,15 +73,19 @@ impl Program {
             return Err(ProgramError { name: self.name.clone(), line: 0, column: 0, fault });
         }
         let mut runs: Vec<Run> = Vec::new();
+        let mut own = None;
         let mut dwells = self.dwells.iter().peekable();
         for (k, step) in self.steps.iter().enumerate() {
             if step.kind == StepKind::Set {
                 continue;
             }
             let setting = self.setting(step);
-            let layer = Layer { program: self, placing, setting };
-            let fault = |fault| ProgramError { name: self.name.clone(), line: step.line, column: 1, fault };
             let same = runs.last().is_some_and(|run| run.tool == setting.tool);
+            if !same {
+                own = self.length_of_stretch(k, placing);
+            }
+            let layer = Layer { program: self, placing, setting, own };
+            let fault = |fault| ProgramError { name: self.name.clone(), line: step.line, column: 1, fault };
             if !same {
                 let start = layer.location(self.start_of(k), self.axes.get(k)).map_err(fault)?;
                 let joints = layer.joints(self.start_of(k)).ok().filter(|_| self.axes.is_empty());
@@ -95,6 +100,7 @@ impl Program {
             run.pace = Pace { rests: run.pace.rests || rests, goes_on: false, ..Pace::default() };
             run.pace.from_unknown = k < self.approach;
             let first = run.path.len() as u32;
+            run.spins(first, setting);
             layer.follow(k, step, run).map_err(fault)?;
             run.line(first, rests);
         }
@@ -102,6 +108,15 @@ impl Program {
             run.standing_s += dwells.map(|(_, seconds)| seconds).sum::<f64>();
         }
         Ok(runs.into_iter().map(|run| run.finished(&self.name)).collect())
+    }
+
+    /// The length of the tool that step `k` moves, mm; `None` where it never feeds before the next change and
+    /// no table knows it.
+    fn length_of_stretch(&self, k: usize, placing: &Placing<'_>) -> Option<f64> {
+        let tool = self.setting(&self.steps[k]).tool;
+        let moves = self.steps[k..].iter().filter(|step| step.kind != StepKind::Set);
+        let fed = || moves.take_while(|step| self.setting(step).tool == tool).find(|step| step.feeds());
+        (placing.lengths)(tool).or_else(|| fed().map(|step| self.setting(step).length[2]))
     }
 }
 
@@ -139,6 +154,20 @@ impl Run {
             turns_stray: 0.0,
             standing_s: 0.0,
             pace: Pace::default(),
+        }
+    }
+
+    /// What the spindle does from move `first` on.
+    fn spins(&mut self, first: u32, setting: &Setting) {
+        let speed = match setting.spindle {
+            Spindle::Off => 0.0,
+            Spindle::Clockwise => setting.speed,
+            Spindle::Anticlockwise => -setting.speed,
+        };
+        let spindle = &mut self.path.origin.spindle;
+        if spindle.last().is_none_or(|(_, before)| *before != speed) {
+            spindle.retain(|(from, _)| *from < first);
+            spindle.push((first, speed));
         }
     }
 
@@ -230,20 +259,22 @@ struct Layer<'a> {
     program: &'a Program,
     placing: &'a Placing<'a>,
     setting: &'a Setting,
+    /// The tool's own length, mm, as far as it is known.
+    own: Option<f64>,
 }
 
 impl Layer<'_> {
     /// How far the true tip is from where the control takes it to be, along the tool.
     fn error_of_length(&self) -> f64 {
-        (self.placing.lengths)(self.setting.tool).map_or(0.0, |length| self.setting.length[2] - length)
+        self.own.map_or(0.0, |length| self.setting.length[2] - length)
     }
 
-    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where the tool's is not
-    /// known, both are the machine's.
+    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where no table knows the
+    /// tool's, it is the machine's.
     fn lengths(&self, kinematics: &Kinematics) -> [f64; 2] {
         match (self.placing.lengths)(self.setting.tool) {
             Some(own) => [self.setting.length[2], own],
-            None => [kinematics.gauge_length(); 2],
+            None => [kinematics.gauge_length() + self.error_of_length(), kinematics.gauge_length()],
         }
     }
 

@@ -1,12 +1,12 @@
 //! What a control remembers between blocks.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::control::{FeedMode, Length, Motion, Plane, Variables};
 use crate::expression::System;
 use crate::frame::{Frame, Place, WORK_OFFSETS};
-use crate::program::Spindle;
+use crate::program::{Spindle, Unset};
 
 /// More work offsets: G54.1 P1 to P300.
 pub(crate) const MORE_OFFSETS: usize = 300;
@@ -115,12 +115,16 @@ pub(crate) struct State {
     pub place: Place,
     pub homes: [Place; 2],
     pub lengths: BTreeMap<u32, [f64; 3]>,
+    /// The registers of lengths whose values are known.
+    pub lengths_set: BTreeSet<u32>,
     pub radii: BTreeMap<u32, f64>,
     pub any_radius: Option<f64>,
     /// Wear of lengths and radii by their registers, mm: it adds to them.
     pub length_wear: BTreeMap<u32, f64>,
     pub radius_wear: BTreeMap<u32, f64>,
     pub register: u32,
+    /// What of the length in force is not known.
+    pub unset: Unset,
     pub selected: Option<u32>,
     pub tool: u32,
     pub spindle: Spindle,
@@ -157,11 +161,13 @@ impl State {
             place: setup.start,
             homes: setup.homes,
             lengths: setup.lengths.clone(),
+            lengths_set: setup.lengths.keys().copied().collect(),
             radii: setup.radii.clone(),
             any_radius: setup.any_radius,
             length_wear: BTreeMap::new(),
             radius_wear: BTreeMap::new(),
             register: 0,
+            unset: Unset::Nothing,
             selected: None,
             tool: 0,
             spindle: Spindle::Off,
@@ -175,6 +181,11 @@ impl State {
     pub fn length_of(&self, number: u32) -> [f64; 3] {
         let [x, y, z] = self.lengths.get(&number).copied().unwrap_or([0.0; 3]);
         [x, y, z + self.length_wear.get(&number).unwrap_or(&0.0)]
+    }
+
+    /// Whether the length of a register is known; H0 is none.
+    pub fn knows_length(&self, number: u32) -> bool {
+        number == 0 || self.lengths_set.contains(&number)
     }
 
     /// The radius of a cutter by the number of D, with its wear, where it is known.

@@ -132,11 +132,18 @@ fn read_with_lengths(
     let any_radius = table.tools.is_empty().then(|| scene.tooling.cutter.radius());
     let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
     let read = read_gcode(name, bytes, control, &setup)?;
-    let longest = lengths.values().copied().fold(0.0, f64::max);
-    if setup.offsets_known || read.highest() + longest <= MACHINE_ZERO_ABOVE {
+    // Under a lesser length than its own the tip hangs lower than the control takes it to be.
+    let taken = read.settings.iter().map(|setting| setting.length[2]);
+    let (least, longest) = lengths
+        .values()
+        .copied()
+        .chain(taken)
+        .fold((0.0, 0.0), |(least, most): (f64, f64), z| (least.min(z), most.max(z)));
+    let highest = read.highest() + longest - least;
+    if setup.offsets_known || highest <= MACHINE_ZERO_ABOVE {
         return Ok(read);
     }
-    let above = Setup::from_above(MACHINE_ZERO_ABOVE + read.highest() + longest);
+    let above = Setup::from_above(MACHINE_ZERO_ABOVE + highest);
     read_gcode(name, bytes, control, &Setup { work: above.work, ..setup })
 }
 

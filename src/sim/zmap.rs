@@ -16,6 +16,8 @@ pub struct ZMap {
     pub height: Vec<f32>,
     /// Index of the move that made the final height (the least one of equals), or [`NOT_CUT`].
     pub cut_by: Vec<u32>,
+    /// How high the highest of it stood before the first cut, mm.
+    pub top: f64,
     /// What stood there before the first cut, where its top is not flat.
     pub shape: Option<Shape>,
     /// The rectangle of the plan that the stock lies in, where its cells may hang over it.
@@ -45,6 +47,7 @@ impl ZMap {
             grid,
             height: vec![top as f32; grid.len()],
             cut_by: vec![NOT_CUT; grid.len()],
+            top,
             shape: None,
             within: None,
         }
@@ -82,17 +85,18 @@ impl ZMap {
             Ok::<Vec<f32>, Cancelled>(centres.map(|q| shape.height_at(q.x, q.y) as f32).collect())
         };
         let height = work::parallel::try_map(grid.ny, row)?.concat();
-        Ok(Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape), within: None })
+        let top = shape.stock.bounds().max.z.max(shape.bottom);
+        Ok(Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], top, shape: Some(shape), within: None })
     }
 
-    /// The same stock before the first cut on other cells; `top` is that of a block, mm.
+    /// The same stock before the first cut on other cells.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
-    pub fn uncut(&self, grid: Grid, top: f64, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+    pub fn uncut(&self, grid: Grid, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
         match &self.shape {
             Some(shape) => Self::of_shape(grid, shape.clone(), monitor),
-            None => Ok(Self::block(grid, top)),
+            None => Ok(Self::block(grid, self.top)),
         }
     }
 }

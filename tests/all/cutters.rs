@@ -80,7 +80,6 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.002 };
     let asked = Asked {
         error_bound: 0.0005,
-        stock_top: settings.stock_top,
         most_cells: 1 << 22,
         most_squares: 1 << 22,
         is_first_look: false,

@@ -252,6 +252,37 @@ fn faults_are_named_with_their_lines() {
     );
 }
 
+/// The tool has one length, and no table says which: with 20 mm the way down behind G49 ends 5 mm deep in the
+/// plate. A rapid there is placed by the length under which the tool feeds.
+#[test]
+fn two_lengths_of_one_tool_leave_the_verdict_open() {
+    let fanuc = ["--control", "fanuc", "--allowance", "1"];
+    let with = |end: &[&str]| {
+        let mut program = raster();
+        program.insert(line_of(&program, "G43") - 1, "G10 L10 P1 R20.".into());
+        let at = line_of(&program, "G0 Z10");
+        program.splice(at..at, end.iter().map(|&line| line.to_owned()));
+        program
+    };
+    for end in [&["G43 H1", "G1 Z0"][..], &["G49", "G0 Z60."], &["G91 G28 Z0", "G49", "G90"]] {
+        let (answer, _) = verify(&with(end), &fanuc);
+        assert_eq!(answer.code, Some(0), "{end:?}: {}", answer.stdout);
+    }
+    let fed = with(&["G49", "G1 Z15. F200"]);
+    let (answer, report) = verify(&fed, &fanuc);
+    let report = &report.unwrap();
+    assert_eq!((answer.code, report["verdict"].as_str()), (Some(1), Some("undecided")), "{}", answer.stdout);
+    let [first, line] = ["G1 Z0", "G1 Z15"].map(|begin| line_of(&fed, begin));
+    let told = format!(
+        "line {line} feeds tool 1 as if it were 0.0000 mm long, and line {first} as if it were 20.0000 mm long"
+    );
+    let open = report["toolpaths"][0]["undecided"].as_array().unwrap();
+    let lengths = open.iter().find(|claim| claim["what"] == "tool lengths").unwrap();
+    assert!(lengths["text"].as_str().unwrap().contains(&told), "{lengths}");
+    assert!(lengths["reason"].as_str().unwrap().contains("`gauge_length`"), "{lengths}");
+    assert_violates(&with(&["G49", "G0 Z15."]), &fanuc, "a rapid move touches stock");
+}
+
 /// Back along a slot: straight it is clear, and at 45 degrees it leads through stock.
 #[test]
 fn a_rapid_that_may_be_bent_into_stock_leaves_the_verdict_open() {

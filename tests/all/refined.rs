@@ -48,7 +48,6 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
     let stock = cut(ZMap::block(grid, ALLOWANCE), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: ASKED,
-        stock_top: ALLOWANCE,
         most_cells: cells,
         most_squares: 1 << 22,
         is_first_look: false,

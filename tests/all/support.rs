@@ -57,7 +57,6 @@ pub fn cut_and_measure(
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: ASKED,
-        stock_top: bounds.max.z + ALLOWANCE,
         most_cells: 1 << 20,
         most_squares: 1 << 22,
         is_first_look: false,

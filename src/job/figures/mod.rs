@@ -29,6 +29,7 @@ use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
 pub(crate) use least_left::LeastLeftFigures;
+pub(crate) use program::with_lengths_open;
 
 use super::JobError;
 use super::run::{Finding, Run};

@@ -5,8 +5,8 @@ use report::{Claim, Figure, Gravity};
 use serde::Serialize;
 use work::monitor::Monitor;
 
-use super::bent_rapids;
 use super::words::value;
+use super::{bent_rapids, removal};
 use crate::JobError;
 use crate::run::{Finding, Run};
 
@@ -32,8 +32,16 @@ struct ProgramFigures {
 }
 
 /// What is checked; warnings beside.
-const CHECKED: [FindingKind; 4] =
-    [FindingKind::SpindleOff, FindingKind::NoFeed, FindingKind::NoTool, FindingKind::OtherLength];
+const CHECKED: [FindingKind; 5] = [
+    FindingKind::SpindleOff,
+    FindingKind::NoFeed,
+    FindingKind::NoTool,
+    FindingKind::OtherLength,
+    FindingKind::SeveralLengths,
+];
+
+/// What decides which of several lengths is a tool's own.
+const BY_A_TABLE: &str = "the `gauge_length` of the tool in a table of tools would decide it";
 
 /// Of programs from elsewhere.
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
@@ -72,7 +80,7 @@ fn claims(name: &str, kind: FindingKind, all: &[Fault], several: bool) -> Vec<Cl
     let of_tool = |found: &&Fault| {
         // The length of a tool names it already.
         let tool = format!(", tool {}", found.tool);
-        claim(name, kind, &[*found], if kind == FindingKind::OtherLength { "" } else { &tool })
+        claim(name, kind, &[*found], if is_of_length(kind) { "" } else { &tool })
     };
     found.iter().map(of_tool).collect()
 }
@@ -84,9 +92,31 @@ fn claim(name: &str, kind: FindingKind, found: &[&Fault], tool: &str) -> Claim {
         Some(first) => format!("{name}: {}{tool} ({motions} motions in all)", first.text),
         None => format!("{name}: no {}", what(kind)),
     };
-    let gravity = if kind == FindingKind::OtherLength { Gravity::Scrap } else { Gravity::Crash };
-    let claim = Claim::length(kind.word(), gravity, 0.0, motions as f64, 0.0);
-    Claim { unit: "", ..claim }.told(text)
+    let gravity = if is_of_length(kind) { Gravity::Scrap } else { Gravity::Crash };
+    let claim =
+        Claim { unit: "", ..Claim::length(kind.word(), gravity, 0.0, motions as f64, 0.0) }.told(text);
+    match kind {
+        // It cuts as it should where the length that was measured with is its own, and the others mean it.
+        FindingKind::SeveralLengths if motions > 0 => {
+            Claim { measured: None, decided_by: BY_A_TABLE, ..claim }
+        }
+        _ => claim,
+    }
+}
+
+fn is_of_length(kind: FindingKind) -> bool {
+    matches!(kind, FindingKind::OtherLength | FindingKind::SeveralLengths)
+}
+
+/// Where it is not known how long a tool is, no place that it comes to violates a limit for certain.
+pub(crate) fn with_lengths_open(mut claims: Vec<Claim>, findings: &[Fault]) -> Vec<Claim> {
+    if findings.iter().any(|found| found.kind == FindingKind::SeveralLengths) {
+        let of_places = |claim: &&mut Claim| claim.unit == "mm" || claim.what == "scallop";
+        for claim in claims.iter_mut().filter(of_places) {
+            removal::doubt(std::slice::from_mut(claim), BY_A_TABLE);
+        }
+    }
+    claims
 }
 
 /// What is not there where all is well.
@@ -96,6 +126,7 @@ fn what(kind: FindingKind) -> &'static str {
         FindingKind::NoFeed => "feed move without F",
         FindingKind::NoTool => "feed before the first tool change",
         FindingKind::OtherLength => "feed with the length of another tool",
+        FindingKind::SeveralLengths => "tool that feeds under several lengths",
         FindingKind::NoEnd => "missing end",
     }
 }

@@ -96,7 +96,7 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
 
 /// The stock, less what other toolpaths and other tools of a program from elsewhere cut before.
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
-    let mut stock = cut.uncut(cut.grid, run.session.top(), monitor)?.within(&run.session.area());
+    let mut stock = cut.uncut(cut.grid, monitor)?.within(&run.session.area());
     for (cutter, path) in run.before() {
         stock = sim::cut(stock, &cutter, &path, monitor).map_err(run.heights())?;
         stock.cut_by.fill(sim::NOT_CUT);

@@ -81,8 +81,7 @@ impl Engine for Cells {
     fn above(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Vec<RidgePlace>, EngineError> {
         let (cut, _) = self.cut(task, monitor)?;
         let most_squares = task.budget.squares_beside(task.moves_held(), &cut.grid);
-        let search = (task.stock.bounds().max.z, most_squares);
-        Ok(places_above(task.part, task.cutters, task.path, &cut, task.limits, search, monitor)?)
+        Ok(places_above(task.part, task.cutters, task.path, &cut, task.limits, most_squares, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
@@ -93,7 +92,6 @@ impl Engine for Cells {
         let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {
             error_bound: task.simulation.error_bound,
-            stock_top: task.stock.bounds().max.z,
             most_cells,
             most_squares: task.budget.squares_beside(held, &grid),
             is_first_look: task.is_first_look,
@@ -117,7 +115,7 @@ impl Engine for Cells {
             refined_rectangles: measurement.refined.rectangles,
             finest_cell: measurement.refined.finest_cell,
             measurement,
-            view: View::Heights(cut),
+            view: View::Heights(Box::new(cut)),
             wall_s: begun.elapsed().as_secs_f64(),
             note,
         })

@@ -102,7 +102,7 @@ impl<'a> Task<'a> {
 #[derive(Debug)]
 pub enum View {
     /// Heights over the plan view.
-    Heights(ZMap),
+    Heights(Box<ZMap>),
     /// Places of the design and the deviation along their normals.
     Normals(Box<NormalView>),
 }

@@ -37,7 +37,6 @@ pub fn cells_above(
     monitor: &dyn Monitor,
 ) -> Result<Vec<bool>, CutError> {
     let Task { part, cutters, path, limits, .. } = *task;
-    let stock_top = task.stock.bounds().max.z;
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
     let facing = task.measures_walls().then(|| task.facing());
     let facing = facing.as_ref();
@@ -46,11 +45,11 @@ pub fn cells_above(
     let meetings = Meetings::new(&surface, cutters, path, None);
     let inspection = Inspection {
         walls: walls.as_ref(),
-        every_move: Some(&EveryMove::new(&surface, cutters, &up_to(part, stock_top))),
+        every_move: Some(&EveryMove::new(&surface, cutters, &up_to(part, cut.top))),
         ..on_cells(part, cutters, limits, asked, &surface, &meetings)
     };
     let samples = inspection.samples(monitor)?;
-    let search = ExcessSearch { inspection: &inspection, stock_top };
+    let search = ExcessSearch { inspection: &inspection };
     Ok(search.cells_above(&samples, height, monitor)?)
 }
 

@@ -98,7 +98,6 @@ fn measured_holding(
     let cut = cut_reference(&ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
-        stock_top: TOP,
         most_cells: 1 << 20,
         most_squares,
         is_first_look: false,

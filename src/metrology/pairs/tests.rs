@@ -51,7 +51,6 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
     let cut = cut_reference(&ZMap::block(grid, 9.0), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
-        stock_top: 9.0,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
         is_first_look: false,

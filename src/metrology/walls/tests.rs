@@ -67,7 +67,6 @@ fn measured_on(cell: f64, part: &Part, cutter: &Cutter, path: &Toolpath) -> Meas
     let cut = cut(ZMap::block(grid, area.max.z), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
-        stock_top: area.max.z,
         border_cuts: true,
         steep_elsewhere: false,
         most_cells: 1 << 20,

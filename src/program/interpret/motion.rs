@@ -32,9 +32,14 @@ impl Interpreter<'_> {
         Ok(to)
     }
 
+    /// Whether an axis has been led to a place.
+    pub fn is_placed(&self, axis: usize) -> bool {
+        self.placed[axis]
+    }
+
     /// An axis is led to a place.
     pub(super) fn place_axis(&mut self, axis: usize) {
-        self.places |= !self.placed[axis];
+        self.places[axis] |= !self.placed[axis];
         self.placed[axis] = true;
     }
 
@@ -57,6 +62,7 @@ impl Interpreter<'_> {
             Motion::Line => {
                 let to = self.target()?;
                 let feed = self.feed(self.length_to(&to))?;
+                self.feeds_in = self.leads_in();
                 self.straight(StepKind::Feed, to, feed)
             }
             Motion::Cycle(cycle) => {
@@ -72,6 +78,18 @@ impl Interpreter<'_> {
                 Err(Stop::new(self.block.column(letter), Fault::Missing { code, words }))
             }
         }
+    }
+
+    /// Whether a straight feed comes from where nobody knows: Z, or X and Y, have their first places here, and
+    /// no axis is without one from here on.
+    fn leads_in(&mut self) -> bool {
+        let [x, y, z, ..] = self.places;
+        let leads =
+            (z || x && y) && self.placed[..3] == [true; 3] && !self.fed && self.compensation.is_none();
+        if leads {
+            self.note("it feeds from where nobody knows; its way there counts neither as time nor as air");
+        }
+        leads
     }
 
     /// A straight move, compensated where the cutter's radius is.
@@ -209,9 +227,10 @@ impl Interpreter<'_> {
         if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
             return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));
         }
-        self.fed |= matches!(kind, StepKind::Feed | StepKind::Arc(_));
+        let feeds_in = std::mem::take(&mut self.feeds_in);
+        self.fed |= matches!(kind, StepKind::Feed | StepKind::Arc(_)) && !feeds_in;
         self.out.steps.push(Step { kind, to: self.state.place, feed, line, setting });
-        if self.places && !self.fed {
+        if self.places.contains(&true) && !self.fed {
             self.out.approach = self.out.steps.len();
         }
         if kind != StepKind::Set {
@@ -230,13 +249,14 @@ impl Interpreter<'_> {
     }
 
     pub(super) fn setting(&self) -> Setting {
-        let State { modal, frame, register, tool, spindle, speed, .. } = &self.state;
+        let State { modal, frame, register, unset, tool, spindle, speed, .. } = &self.state;
         Setting {
             tool: *tool,
             spindle: *spindle,
             speed: *speed,
             register: *register,
             length: frame.length,
+            unset: *unset,
             tip_kept: modal.tip_kept || modal.length == Length::Tcp,
             work: frame.active as u32 + 1,
         }

@@ -6,7 +6,7 @@ use crate::block::CodeWord;
 use crate::control::{Length, spelled};
 use crate::error::{Fault, Stop};
 use crate::frame::{Place, Rotation};
-use crate::program::StepKind;
+use crate::program::{StepKind, Unset};
 use crate::state::MORE_OFFSETS;
 
 impl Interpreter<'_> {
@@ -62,6 +62,7 @@ impl Interpreter<'_> {
                 [0, 1, 2].map(|k| words[k].or(old[k]).map_or(before[k], |x| x * self.state.modal.unit))
             }
         };
+        self.state.unset = self.unset_part(length, number);
         self.state.modal.length = length;
         self.state.register = match length {
             Length::Off => 0,
@@ -74,6 +75,22 @@ impl Interpreter<'_> {
             self.push(StepKind::Set, 0.0)?;
         }
         Ok(())
+    }
+
+    /// What of a length that takes force nobody knows. `number` is its register.
+    fn unset_part(&self, length: Length, number: Option<u32>) -> Unset {
+        let state = &self.state;
+        let register = number.unwrap_or(state.tool);
+        match length {
+            Length::Plus | Length::Tcp if !state.knows_length(register) => Unset::Plus(register),
+            Length::Minus if !state.knows_length(register) => Unset::Minus(register),
+            Length::More => match number.filter(|number| !state.knows_length(*number)) {
+                Some(_) => Unset::Sum(self.line_number()),
+                None => state.unset,
+            },
+            Length::Given if [b'Z', b'K'].iter().all(|word| self.block.peek(*word).is_none()) => state.unset,
+            _ => Unset::Nothing,
+        }
     }
 
     /// Machine coordinates of the spindle nose.
@@ -110,6 +127,7 @@ impl Interpreter<'_> {
             }
             if let Some(z) = self.block.take(b'Z') {
                 self.state.lengths.entry(number).or_default()[2] = z * unit;
+                self.state.lengths_set.insert(number);
             }
             return Ok(());
         }
@@ -123,6 +141,9 @@ impl Interpreter<'_> {
         };
         let state = &mut self.state;
         let (any_radius, incremental) = (state.any_radius.unwrap_or(0.0), !state.modal.absolute);
+        if kind == 10 && !incremental {
+            state.lengths_set.insert(number);
+        }
         let entry = match kind {
             10 => &mut state.lengths.entry(number).or_default()[2],
             11 => state.length_wear.entry(number).or_default(),
@@ -189,7 +210,7 @@ impl Interpreter<'_> {
         if named {
             let over = self.target()?;
             self.go(StepKind::Rapid, over)?;
-            self.places = false;
+            self.places = [false; 6];
         }
         (0..6).filter(|k| letters[*k]).for_each(|k| self.place_axis(k));
         let mut to = self.nose();
