@@ -28,7 +28,7 @@ mod words;
 use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
-pub(crate) use least_left::LeastLeftFigures;
+pub(crate) use least_left::{LeastLeftFigures, Violated};
 
 use super::JobError;
 use super::run::{Finding, Run};
