@@ -334,6 +334,28 @@ mod tests {
         assert!((upright.height - upright.bound) * normal.z > 1.2 * stands, "{upright:?} {stands}");
     }
 
+    /// The same along the normals of steep walls on level ground.
+    #[test]
+    fn a_wall_is_left_at_its_foot_as_the_ground_is() {
+        for degrees in [85f64, 88.0, 89.5] {
+            let angle = degrees.to_radians();
+            let mesh = height_field(120, 12.0, 0.0, |x, _| (x - 6.0).max(0.0) * angle.tan());
+            let bvh = Bvh::new(&mesh);
+            let ball = Cutter::ball(6.0).unwrap();
+            let drop = DropCutter::over(&mesh, &bvh, &ball, None, &Silent).unwrap();
+            let stands = 3.0 * (1.0 - (1.0 - (0.5 * angle).tan().powi(2)).sqrt());
+            let (foot, normal) = (Point3::new(6.0, 6.0, 0.0), Vector3::new(-angle.sin(), 0.0, angle.cos()));
+            let least = |more_than: f64| drop.least_left(&ball, &foot, &normal, more_than, &Silent).unwrap();
+            for share in [0.2, 0.9] {
+                let found = least(share * stands).unwrap();
+                let proven = found.height - found.bound;
+                assert!(proven > share * stands && proven <= stands + 1e-6, "{found:?} {stands}");
+                assert!(found.height >= stands - 1e-6 && found.height <= 1.02 * stands, "{found:?} {stands}");
+            }
+            assert_eq!(least(1.02 * stands), None);
+        }
+    }
+
     /// From beside the best position the search comes to it: in a hollow a cutter that rests on its corner
     /// leaves least over its middle.
     #[test]

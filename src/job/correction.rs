@@ -24,14 +24,14 @@ mod widths;
 
 use std::sync::Arc;
 
-use metrology::{Engine, Measured, Measurement, RidgeMap, Task};
+use metrology::{Engine, Measured, RidgeMap, Task};
 use scene::ToolpathRequest;
-use toolpath::{Earlier, Kept, Step, plane_interval};
+use toolpath::{Earlier, Faces, Kept, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::covered::Covered;
 use super::earlier::EarlierPath;
-use super::figures::LeastLeftFigures;
+use super::figures::{LeastLeftFigures, Violated};
 use super::measuring::Closeness;
 use super::planned::Planned;
 use super::tool::Around;
@@ -121,6 +121,8 @@ struct Corrected<'a> {
     is_complete: bool,
     /// Whether every path of the cutter leaves more than the target somewhere.
     is_hopeless: bool,
+    /// What every path of the cutter leaves somewhere, mm.
+    least_left: f64,
 }
 
 impl Session {
@@ -195,6 +197,7 @@ impl Session {
             made: Vec::new(),
             is_complete: false,
             is_hopeless: false,
+            least_left: 0.0,
         };
         corrected.remember_best();
         let looked = match looked {
@@ -269,12 +272,12 @@ impl Corrected<'_> {
 
     /// Plans anew while what the verdict is made of stands above the target.
     fn by_measurements(&mut self, mut looked: Looked, monitor: &dyn Monitor) -> Result<Looked, JobError> {
-        if self.is_unavoidable(&looked.measured.measurement, monitor)? {
-            self.look_at_all_of_best(&mut looked, monitor)?;
-            return Ok(looked);
-        }
         if looked.of_cells_alone && self.next(0, MEASURED_SLACK).is_some() {
             self.look_at_all_of_best(&mut looked, monitor)?;
+        }
+        if self.is_unavoidable(&looked, monitor)? {
+            self.look_at_all_of_best(&mut looked, monitor)?;
+            return Ok(looked);
         }
         let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
         for round in 0..MOST_MEASURED_NEAR {
@@ -361,22 +364,35 @@ impl Corrected<'_> {
         let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
         let is_alone = self.request.axis.is_none() && !self.request.stock_is_previous;
-        let Some((at, _)) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit) else {
+        let Some((at, height)) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit)
+        else {
             return Ok(false);
         };
         let cutter = &self.request.tooling.cutter;
-        let left = LeastLeftFigures::at_or_elsewhere(self.session, &[*cutter], &[(*at, limit)], monitor)?;
+        let place = Violated::near(&self.session.part, at, [*height, limit]);
+        let left = LeastLeftFigures::at_or_elsewhere(self.session, &[*cutter], &[place], monitor)?;
         Ok(self.leaves_nearly(left))
     }
 
-    /// Whether the best plan leaves what every path of the cutter leaves.
-    fn is_unavoidable(&mut self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
-        if self.tried.standing.round.holds(&self.goal) || self.request.stock_is_previous {
+    /// Whether the best plan leaves what every path of the cutter leaves, behind what cut before it.
+    fn is_unavoidable(&mut self, looked: &Looked, monitor: &dyn Monitor) -> Result<bool, JobError> {
+        let (session, path) = (self.session, &self.best.plan.path);
+        // What this toolpath leaves to others is no reason to leave its own faces as they are.
+        let is_for_all = self.best.plan.kept.faces == Faces::ALL
+            && !session.rest_follows(self.request)
+            && !self.request.is_for_places();
+        let is_behind = self.request.stock_is_previous;
+        if self.tried.standing.round.holds(&self.goal) || is_behind && !is_for_all {
             return Ok(false);
         }
-        let (session, path) = (self.session, &self.best.plan.path);
-        let cutter = &self.request.tooling.cutter;
-        let left = LeastLeftFigures::above_limit(session, (&[*cutter], false), path, &[measured], monitor)?;
+        let with = (&[self.request.tooling.cutter][..], is_behind);
+        let least = |violated| LeastLeftFigures::above_limit(session, with, path, violated, monitor);
+        let left = least(Violated::of(session, &looked.measured.measurement))?;
+        let unseen = looked.covered.as_ref().and_then(|covered| covered.unseen.as_ref());
+        let unseen = unseen.filter(|_| is_for_all).map(|unseen| Violated::unseen(session, unseen));
+        let at_foot = unseen.map_or(Ok(None), least)?;
+        self.is_hopeless |= at_foot.is_some();
+        self.least_left = left.iter().chain(&at_foot).map(|left| left.height_mm).fold(0.0, f64::max);
         Ok(self.leaves_nearly(left))
     }
 
@@ -386,9 +402,10 @@ impl Corrected<'_> {
         left.is_some_and(|left| self.tried.standing.round.highest() <= NEAR_LEAST * left.height_mm)
     }
 
-    /// Whether no other plan is made: none holds the target, and the last one was no better.
+    /// Whether no other plan is made: none holds the target, and the last one was no better, or none can be.
     fn ends_in_vain(&self, in_vain: usize) -> bool {
-        self.is_hopeless && in_vain > 0
+        let round = &self.tried.standing.round;
+        self.is_hopeless && (in_vain > 0 || round.is_in_vain(self.least_left, &self.goal))
     }
 
     /// Whether a plan stands above the target, but little.

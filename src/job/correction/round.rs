@@ -93,7 +93,8 @@ impl CorrectionRound {
     }
 
     /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what
-    /// holds the target, then what is shorter; where neither holds it, the one with the lower ridge.
+    /// holds the target, then what is shorter; where neither holds it, the one with the lower ridge, unless that
+    /// takes little off and the other's is as high within its bound: then what is shorter as well.
     pub(super) fn is_better(&self, other: &Self, goal: &Goal) -> bool {
         let clear = [self, other].map(|round| round.too_near_between_mm.is_none());
         if clear[0] != clear[1] {
@@ -101,19 +102,44 @@ impl CorrectionRound {
         }
         match (self.holds(goal), other.holds(goal)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
+            (false, false)
+                if self.cutting_length_mm != other.cutting_length_mm && self.is_as_high(other, goal) =>
+            {
+                self.cutting_length_mm < other.cutting_length_mm
+            }
             (false, false) => self.highest() < other.highest(),
             (holds, _) => holds,
         }
     }
 
+    /// Whether this round and another, which do not hold the target, leave as much: the higher one within the bound
+    /// of the lower one, which takes no more off than a plan in vain.
+    fn is_as_high(&self, other: &Self, goal: &Goal) -> bool {
+        let (low, high) = if self.highest() < other.highest() { (self, other) } else { (other, self) };
+        let bound = low.error_bound_mm.filter(|_| low.measured && high.measured);
+        bound.is_some_and(|bound| high.highest() - low.highest() <= bound)
+            && !low.takes(LEAST_GAIN, high, goal)
+    }
+
+    /// Whether no other plan gains anything over this one, where every one leaves so much, mm: no more than this
+    /// round's bound lies between them, nor than a plan in vain takes.
+    pub(super) fn is_in_vain(&self, left: f64, goal: &Goal) -> bool {
+        let most = LEAST_GAIN * (self.highest() - goal.target);
+        self.highest() - left <= self.error_bound_mm.unwrap_or(0.0).min(most)
+    }
+
+    /// Whether this round takes a share of what another one leaves above the target.
+    fn takes(&self, share: f64, other: &Self, goal: &Goal) -> bool {
+        let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
+        self.holds(goal) || above(self) <= (1.0 - share) * above(other)
+    }
+
     /// What a plan gains over the best one before it.
     pub(super) fn gain_over(&self, best: &Self, goal: &Goal) -> Gain {
-        let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
-        let takes = |share: f64| self.holds(goal) || above(self) <= (1.0 - share) * above(best);
         match self.is_better(best, goal) {
             false => Gain::None,
-            true if takes(MUCH) => Gain::Much,
-            true if takes(LEAST_GAIN) => Gain::Enough,
+            true if self.takes(MUCH, best, goal) => Gain::Much,
+            true if self.takes(LEAST_GAIN, best, goal) => Gain::Enough,
             true => Gain::Little,
         }
     }
@@ -159,6 +185,12 @@ mod tests {
         assert!(better(round(1.2, 20.0), colliding(round(0.8, 10.0))));
         assert!(!better(colliding(round(0.8, 10.0)), round(1.2, 20.0)));
         assert!(better(colliding(round(0.8, 9.0)), colliding(round(0.7, 10.0))));
+        // Where neither holds the target and one is as high as the other within its bound, what is shorter.
+        assert!(better(round(1.2, 10.0), round(1.19, 20.0)) && !better(round(1.19, 20.0), round(1.2, 10.0)));
+        let close = |round| CorrectionRound { error_bound_mm: Some(0.005), ..round };
+        assert!(better(close(round(1.19, 20.0)), close(round(1.2, 10.0))));
+        let by_ridges = |round| CorrectionRound { measured: false, ..round };
+        assert!(better(by_ridges(round(1.19, 20.0)), by_ridges(round(1.2, 10.0))));
         // A tenth of what stands above the target is worth another plan of its kind; less is kept, but no
         // reason to go on.
         let gain = |a: CorrectionRound, b: CorrectionRound| a.gain_over(&b, &strict);

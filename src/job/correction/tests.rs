@@ -15,7 +15,11 @@ fn planned(correct: bool, toolpath: &str) -> report::ToolpathResult {
 }
 
 fn figure(result: &report::ToolpathResult) -> Option<&serde_json::Value> {
-    result.figures.iter().find(|figure| figure.key == "correction").map(|figure| &figure.value)
+    figure_of(result, "correction")
+}
+
+fn figure_of<'a>(result: &'a report::ToolpathResult, key: &str) -> Option<&'a serde_json::Value> {
+    result.figures.iter().find(|figure| figure.key == key).map(|figure| &figure.value)
 }
 
 /// Cells that show no pass tell nothing about a plan: it is made as by finer ones, and judged on these.
@@ -78,9 +82,15 @@ fn a_corner_that_was_never_cut_gets_a_pass_of_its_own() {
 
 /// A zigzag under a ball of 6 mm for ridges of so many mm, with further keys, over a mesh 12 mm wide: level ground and
 /// walls in turn, each `(across, up)`, mm.
-fn over_steps(
+fn over_steps(profile: &[[f64; 2]], with: (f64, &str), monitor: &dyn Monitor) -> report::ToolpathResult {
+    over_steps_at(profile, with, 0, monitor)
+}
+
+/// The same of that toolpath.
+fn over_steps_at(
     profile: &[[f64; 2]],
     (scallop, keys): (f64, &str),
+    toolpath: usize,
     monitor: &dyn Monitor,
 ) -> report::ToolpathResult {
     let corner = |at: [f64; 2], y: f64| {
@@ -98,7 +108,8 @@ fn over_steps(
         facets += &(facet([a.clone(), b, c.clone()]) + &facet([a, c, d]));
         at = next;
     }
-    let file = std::env::temp_dir().join(format!("steps_{scallop}_{}.stl", std::process::id()));
+    let of = format!("{scallop}_{}_{}", profile.len(), std::process::id());
+    let file = std::env::temp_dir().join(format!("steps_{of}.stl"));
     std::fs::write(&file, format!("solid steps\n{facets}endsolid steps\n")).unwrap();
     let text = format!(
         "[part]\nfile = {:?}\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = {scallop}\nuncut = 6\n\
@@ -106,7 +117,7 @@ fn over_steps(
         file.to_str().unwrap()
     );
     let session = Session::new(Scene::parse("steps.toml", text).unwrap()).unwrap();
-    let result = session.toolpath(&session.scene.toolpaths[0], monitor).unwrap().result;
+    let result = session.toolpath(&session.scene.toolpaths[toolpath], monitor).unwrap().result;
     std::fs::remove_file(file).unwrap();
     result
 }
@@ -129,6 +140,25 @@ fn plans_are_compared_by_what_no_cell_sees_as_well() {
     assert!(told >= result.excess.reached.unwrap().max_mm, "{told} {:?} {correction}", result.excess);
 }
 
+/// At the foot of a wall of 85 degrees a ball that touches both leaves `r (1 - √(1 - tan² 42.5°))` along the normal of
+/// either, which cells see along that of the level ground alone. No width takes it away.
+#[test]
+fn passes_are_not_narrowed_for_the_foot_of_a_wall() {
+    let stands = 3.0 * (1.0 - (1.0 - 42.5f64.to_radians().tan().powi(2)).sqrt());
+    let steps = [[6.0, 0.0], wall(85.0, 6.0), [6.0, 0.0]];
+    let behind = "\n[[toolpath]]\nname = \"again\"\nstrategy = \"zigzag\"\nstock = \"previous\"";
+    for (keys, own) in [("", 0), ("angle = 90", 0), (&format!("stepover = 2{behind}"), 1)] {
+        let result = over_steps_at(&steps, (0.9, keys), own, &Silent);
+        let left = figure_of(&result, "least_left").unwrap_or_else(|| panic!("{keys}: {:?}", result.notes));
+        let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| left[key].as_f64().unwrap());
+        assert!(height - bound <= stands + 1e-6 && height >= stands - 1e-6, "{height} ± {bound} {stands}");
+        let rounds = figure(&result).unwrap()["rounds"].as_array().unwrap();
+        let measured = rounds.iter().filter(|round| round["measured"].as_bool().unwrap()).count();
+        assert!(measured <= 2, "{keys}: {rounds:?}");
+        assert!(result.excess.reached.unwrap().max_mm < 1.3 * stands, "{keys}: {:?}", result.excess);
+    }
+}
+
 /// Counts how often all that a plan leaves is measured.
 struct Looks(AtomicUsize);
 
@@ -139,12 +169,13 @@ impl Monitor for Looks {
 }
 
 /// The planner has a least interval on walls: narrower widths bring the path of an earlier round, which is cut and
-/// measured once.
+/// measured once. Of a bar nothing tells what every path leaves at the foot of a wall, so that plans go on.
 #[test]
 fn a_plan_that_comes_out_as_an_earlier_one_is_not_measured_again() {
     let profile = [[6.0, 0.0], wall(80.0, 4.0), [6.0, 0.0], wall(88.0, -5.0), [6.0, 0.0]];
     let looks = Looks(AtomicUsize::new(0));
-    let result = over_steps(&profile, (0.4, ""), &looks);
+    let bar = "[stock]\nfrom = [9, 6, -2]\naxis = \"z\"\ndiameter = 40\nlength = 7";
+    let result = over_steps(&profile, (0.4, bar), &looks);
     let rounds = figure(&result).unwrap()["rounds"].as_array().unwrap();
     let measured = rounds.iter().filter(|round| round["measured"].as_bool().unwrap());
     let mut lengths: Vec<f64> = measured.map(|round| round["cutting_length_mm"].as_f64().unwrap()).collect();

@@ -5,14 +5,16 @@ use serde::Serialize;
 
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use geometry::Point3;
-use metrology::{Bounded, Limits, Measurement};
-use motion::Toolpath;
-use part::SurfacePoint;
+use geometry::{Point3, Vector3};
+use metrology::{Bounded, Measurement};
+use motion::{ROUNDING, Toolpath};
+use part::Part;
 use report::{Figure, micrometres, place, with_bound};
+use sim::Stock;
 use work::monitor::{self, Cancelled, Monitor};
 
 use super::words::value;
+use crate::covered::Unseen;
 use crate::judge::highest_reached;
 use crate::run::{Finding, Run};
 use crate::{JobError, Session};
@@ -41,46 +43,35 @@ const LEAST_START: f64 = 0.1;
 /// A height with a bound above this share of it is told by what is proven of it alone.
 const CLOSE: f64 = 0.1;
 
+/// This share of what stands above a limit is asked for first.
+const NEARLY_ALL: f64 = 0.9;
+
 /// Of the normal's z. Where the part is steeper, it is a wall.
 const LEAST_LEVEL: f64 = 0.2;
 
 impl LeastLeftFigures {
-    /// `None` where the highest material holds its limit, or may hold it after another path of these cutters.
-    /// Where others cut `before` them, only what stands is told: elsewhere those may have left less.
+    /// Of what is `violated` by the cut of a `path`, the first that tells. `None` where that may hold its limit after
+    /// another path of these cutters. Where others cut `before` them, only what stands is told: elsewhere those may
+    /// have left less.
     pub fn above_limit(
         session: &Session,
         (cutters, before): (&[Cutter], bool),
         path: &Toolpath,
-        measurements: &[&Measurement],
+        violated: Vec<Violated>,
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
-        let scene = &session.scene;
-        let Limits { scallop, uncut, .. } = scene.tolerance;
-        let limited = |measured: &&Measurement| {
-            let ridge = (highest_reached(measured), scene.scallop_rule.highest * scallop);
-            [ridge, (measured.excess.unreached, uncut)]
-        };
-        let violated: Vec<(Bounded, f64)> = measurements
-            .iter()
-            .flat_map(limited)
-            .filter(|(material, limit)| material.stands_mm() > *limit && material.at_mm.is_some())
-            .collect();
         if violated.is_empty() || !path.is_upright() {
             return Ok(None);
         }
-        let places = violated.iter().filter_map(|(material, limit)| Some((material.at_mm?.into(), *limit)));
-        let places: Vec<(Point3, f64)> = places.collect();
         if !before {
-            return Self::at_or_elsewhere(session, cutters, &places, monitor);
+            return Self::at_or_elsewhere(session, cutters, &violated, monitor);
         }
         let drops = drops(session, cutters, monitor)?;
-        for ((place, limit), (material, _)) in places.iter().zip(&violated) {
-            if let Some(found) =
-                Self::at(session, &drops, session.part.closest_point(place).0, *limit, monitor)?
-            {
+        for place in violated {
+            if let Some(found) = Self::of(session, &drops, &place, monitor)? {
                 // Those before left no less there than what stands.
-                let stands = material.stands_mm();
-                let proven = (found.height_mm - found.error_bound_mm).min(stands);
+                let stands = place.stands;
+                let proven = found.proven_mm().min(stands);
                 let height_mm = found.height_mm.min(stands);
                 return Ok(Some(Self { height_mm, error_bound_mm: height_mm - proven, ..found }));
             }
@@ -88,27 +79,25 @@ impl LeastLeftFigures {
         Ok(None)
     }
 
-    /// Of the first of some places that each cutter leaves more at than the place's limit, both mm, or else
-    /// of one where it leaves more than any limit allows: beside a border it may come lower than elsewhere in
-    /// a hollow. `None` where a path may hold the limits, as far as these places tell.
+    /// Of the first of some places that each cutter leaves more at than the place's limit, or else of one where
+    /// it leaves more than any limit allows: beside a border it may come lower than elsewhere in a hollow.
+    /// `None` where a path may hold the limits, as far as these places tell.
     pub fn at_or_elsewhere(
         session: &Session,
         cutters: &[Cutter],
-        places: &[(Point3, f64)],
+        places: &[Violated],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
-        let scene = &session.scene;
         let drops = drops(session, cutters, monitor)?;
-        let least = |design, limit| Self::at(session, &drops, design, limit, monitor);
-        for (place, limit) in places {
-            if let Some(found) = least(session.part.closest_point(place).0, *limit)? {
+        for place in places {
+            if let Some(found) = Self::of(session, &drops, place, monitor)? {
                 return Ok(Some(found));
             }
         }
-        let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
+        let any_limit = ridge_limit(session).max(session.scene.tolerance.uncut);
         for place in most_left(session, &drops, LEAST_START * any_limit, monitor)? {
             if place.left > any_limit
-                && let Some(found) = least(place.design, any_limit)?
+                && let Some(found) = Self::at(session, &drops, place.line, any_limit, monitor)?
             {
                 return Ok(Some(found));
             }
@@ -116,33 +105,135 @@ impl LeastLeftFigures {
         Ok(None)
     }
 
+    /// What no path of these cutters takes away, mm.
+    fn proven_mm(&self) -> f64 {
+        self.height_mm - self.error_bound_mm
+    }
+
+    /// At a violated place: of nearly all that stands there above its limit, which tells more, or of the limit alone.
+    fn of(
+        session: &Session,
+        drops: &[(Cutter, DropCutter<'_>)],
+        &Violated { line, stands, limit }: &Violated,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, JobError> {
+        let nearly = limit + NEARLY_ALL * (stands - limit).max(0.0);
+        let least = |more_than| Self::at(session, drops, line, more_than, monitor);
+        let found = if nearly.is_finite() { least(nearly)? } else { None };
+        let found = if found.is_some() { found } else { least(limit)? };
+        Ok(found.map(|found| Self { limit_mm: limit, ..found }))
+    }
+
     /// At a place of the part, where each cutter leaves more than a limit, mm.
     fn at(
         session: &Session,
         drops: &[(Cutter, DropCutter<'_>)],
-        design: SurfacePoint,
+        line: Line,
         limit: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
-        if design.normal.z < LEAST_LEVEL {
-            return Ok(None);
-        }
-        let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
-        let stock = stock / design.normal.z;
+        let Line { at, normal } = line;
+        let stock = line.way_in(&session.stock);
         // What one cutter takes away does not stand: the least of all, and no less than the lowest bound.
         let (mut height, mut proven) = (f64::INFINITY, f64::INFINITY);
         for (cutter, drop) in drops {
-            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
+            let left = drop.least_left(cutter, &at, &normal, limit, monitor)?;
             let Some(left) = left.filter(|left| left.height <= stock) else { return Ok(None) };
             (height, proven) = (height.min(left.height), proven.min(left.height - left.bound));
         }
         Ok(height.is_finite().then(|| Self {
             height_mm: height,
             error_bound_mm: height - proven,
-            at_mm: design.point.into(),
+            at_mm: at.into(),
             limit_mm: limit,
         }))
     }
+}
+
+/// The line up from a place of the part along its outward unit normal, mm.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    at: Point3,
+    normal: Vector3,
+}
+
+impl Line {
+    /// How far it runs in a stock that nothing cut, mm, as far as that is known: nothing stands beyond a side of
+    /// the block. Of stock that is none, as high as it is over the place of a part that is no wall.
+    fn way_in(&self, stock: &Stock) -> f64 {
+        let Self { at, normal } = self;
+        match stock {
+            _ if normal.z < 0.0 => f64::NEG_INFINITY,
+            Stock::Box(block) => {
+                let way = |c: usize| {
+                    let side = if normal[c] > 0.0 { block.max[c] } else { block.min[c] };
+                    if normal[c] == 0.0 { f64::INFINITY } else { (side - at[c]) / normal[c] }
+                };
+                way(0).min(way(1)).min(way(2))
+            }
+            _ if normal.z < LEAST_LEVEL => f64::NEG_INFINITY,
+            _ => (stock.height_at(at.x, at.y) - at.z) / normal.z,
+        }
+    }
+}
+
+/// Material above its limit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Violated {
+    /// Where it stands.
+    line: Line,
+    /// So much of it for certain, mm.
+    stands: f64,
+    /// What may stand there, mm.
+    limit: f64,
+}
+
+impl Violated {
+    /// At the place of the part nearest to another, in mm.
+    pub fn near(part: &Part, at: &Point3, [stands, limit]: [f64; 2]) -> Self {
+        let foot = part.closest_point(at).0;
+        Self { line: Line { at: foot.point, normal: foot.normal }, stands, limit }
+    }
+
+    /// Material that exceeds its limit, mm, at the place of the part nearest to it.
+    fn by(session: &Session, material: &Bounded, limit: f64) -> Option<Self> {
+        let (at, stands) = (material.at_mm?, material.stands_mm());
+        (stands > limit).then(|| Self::near(&session.part, &at.into(), [stands, limit]))
+    }
+
+    /// The highest ridge or remnant along a border, and the highest uncut material.
+    pub fn of(session: &Session, measured: &Measurement) -> Vec<Self> {
+        let ridge = Self::by(session, &highest_reached(measured), ridge_limit(session));
+        let uncut = Self::by(session, &measured.excess.unreached, session.scene.tolerance.uncut);
+        ridge.into_iter().chain(uncut).collect()
+    }
+
+    /// Where no cell sees, a place that is about as high as any, as far inside of the part's box as may be: over a
+    /// border the cutter comes lower. Not what is nearest to the highest ridge: in a hollow that may be another face.
+    /// Up to the uncut limit all answers to that of ridges there, and what is above both violates one of them.
+    pub fn unseen(session: &Session, unseen: &Unseen) -> Vec<Self> {
+        let (limit, bounds) = (ridge_limit(session), session.part.bounds());
+        let places = unseen.above.iter().map(|(place, normal)| {
+            let line = Line { at: place.at, normal: *normal };
+            Self { line, stands: place.height - ROUNDING, limit }
+        });
+        let places: Vec<Self> = places.filter(|place| place.stands > limit).collect();
+        let highest = places.iter().map(|place| place.stands).fold(limit, f64::max);
+        let high = places.into_iter().filter(|place| place.stands >= limit + NEARLY_ALL * (highest - limit));
+        let inside = |Self { line: Line { at, .. }, .. }: &Self| {
+            let ways = [0, 1].map(|c| (at[c] - bounds.min[c]).min(bounds.max[c] - at[c]));
+            ways[0].min(ways[1])
+        };
+        let inmost = high.max_by(|a, b| inside(a).total_cmp(&inside(b)));
+        let unreached = &unseen.measurement.excess.unreached;
+        let uncut = Self::by(session, unreached, session.scene.tolerance.uncut);
+        inmost.into_iter().chain(uncut).collect()
+    }
+}
+
+/// What the highest ridge may stand above the design, mm.
+fn ridge_limit(session: &Session) -> f64 {
+    session.scene.scallop_rule.highest * session.scene.tolerance.scallop
 }
 
 /// What tells how low each cutter comes over the part.
@@ -161,7 +252,7 @@ fn drops<'a>(
 struct Place {
     left: f64,
     at: [f64; 2],
-    design: SurfacePoint,
+    line: Line,
 }
 
 /// Places where the cutters leave most of all nearby, most first: those of a raster that leave more than
@@ -180,7 +271,7 @@ fn most_left(
             drop.left_by_search(cutter, &design.point, &design.normal, least)
         };
         let left = drops.iter().map(by).fold(f64::INFINITY, f64::min) * design.normal.z;
-        Some(Place { left, at, design })
+        Some(Place { left, at, line: Line { at: design.point, normal: design.normal } })
     };
     let raster = work::parallel::try_map(PLACES * PLACES, |k| {
         monitor::check(monitor)?;
@@ -230,11 +321,11 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
             cutters.push(*cutter);
         }
     }
-    let unseen = run.covered.unseen.iter().map(|unseen| &unseen.measurement);
-    let measured: Vec<&Measurement> = std::iter::once(run.measurement()).chain(unseen).collect();
     let before = !run.before().is_empty();
     let with = (&cutters[..], before);
-    let left = LeastLeftFigures::above_limit(run.session, with, &run.whole.path, &measured, monitor)?;
+    let unseen = run.covered.unseen.iter().flat_map(|unseen| Violated::unseen(run.session, unseen));
+    let violated = unseen.chain(Violated::of(run.session, run.measurement())).collect();
+    let left = LeastLeftFigures::above_limit(run.session, with, &run.whole.path, violated, monitor)?;
     let Some(left) = left else { return Ok(Finding::default()) };
     let (height, bound) = (left.height_mm, left.error_bound_mm);
     let height = if bound <= CLOSE * height {
@@ -362,8 +453,8 @@ mod tests {
         let session = Session::new(Scene::parse("hollows.toml", text).unwrap()).unwrap();
         let left = |at: [f64; 3]| {
             let cutter = &session.scene.tooling.cutter;
-            let left =
-                LeastLeftFigures::at_or_elsewhere(&session, &[*cutter], &[(at.into(), 0.027)], &Silent);
+            let place = Violated::near(&session.part, &at.into(), [0.027; 2]);
+            let left = LeastLeftFigures::at_or_elsewhere(&session, &[*cutter], &[place], &Silent);
             left.unwrap().unwrap_or_else(|| panic!("nothing is left at {at:?}"))
         };
         // Beside the trough at x 1.5, y 3 the ball touches along x and y.

@@ -28,7 +28,7 @@ mod words;
 use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
-pub(crate) use least_left::LeastLeftFigures;
+pub(crate) use least_left::{LeastLeftFigures, Violated};
 pub(crate) use program::with_lengths_open;
 
 use super::JobError;
