@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use millstream::geometry::TriangleMesh;
+use millstream::geometry::{Point3, TriangleMesh};
 use serde_json::Value;
 
 use crate::support::{height_mesh, number, patch, run_scene, write_stl};
@@ -292,4 +292,44 @@ fn smoothed_streamlines_hold_the_target() {
     assert!(over[1] <= 0.01 && highest[1] <= 0.011, "{over:?} {highest:?}");
     let (moves, length) = (of("simulation/moves"), of("path/cutting_length_mm"));
     assert!(moves[1] < 0.7 * moves[0] && length[1] < 1.03 * length[0], "{moves:?} {length:?}");
+}
+
+/// A plate of 22 × 10 mm with a notch in its upper side.
+fn notched_plate() -> Vec<[Point3; 3]> {
+    let (x, y) = ([0.0, 8.0, 14.0, 22.0], [0.0, 5.1, 10.0]);
+    let cells = [[0, 0], [1, 0], [2, 0], [0, 1], [2, 1]];
+    let halves = |[i, j]: [usize; 2]| {
+        let [a, b, c, d] =
+            [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[k, l]| Point3::new(x[i + k], y[j + l], 0.0));
+        [[a, b, c], [a, c, d]]
+    };
+    cells.into_iter().flat_map(halves).collect()
+}
+
+/// A round disk with a radius of 10 mm.
+fn disk() -> Vec<[Point3; 3]> {
+    let at = |k: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * (k % 90) as f64 / 90.0).sin_cos();
+        Point3::new(10.0 * cos, 10.0 * sin, 0.0)
+    };
+    (0..90).map(|k| [Point3::origin(), at(k), at(k + 1)]).collect()
+}
+
+/// Passes are planned for the part and not for the rectangle around it: all of it is cut, in no more time (within
+/// 2 %) than by straight passes at their best angle.
+#[test]
+fn streamlines_are_quick_on_parts_that_are_no_rectangle() {
+    let scene = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[tolerance]\nscallop = 0.02\n\
+                 [[toolpath]]\nstrategy = \"streamline\"\n\
+                 [[toolpath]]\nstrategy = \"zigzag\"\nangle = \"best\"\nlinks = \"surface\"\n";
+    for (name, triangles) in [("notched plate", notched_plate()), ("disk", disk())] {
+        let home = tempfile::tempdir().unwrap();
+        write_stl(&home.path().join("part.stl"), &triangles);
+        let file = home.path().join("scene.toml");
+        std::fs::write(&file, scene).unwrap();
+        let (code, report) = run_scene(&file);
+        assert_eq!(code, 0, "{name}");
+        let time = |k: usize| number(&report, &format!("/toolpaths/{k}/path/machining_time_s"));
+        assert!(time(0) <= 1.02 * time(1), "{name}: {} {}", time(0), time(1));
+    }
 }

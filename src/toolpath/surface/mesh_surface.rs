@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use crate::vocabulary::PlanError;
 use cutter::Cutter;
 use field::mesh::{Bend, Coarser, FieldMesh, MeshFieldError, Refined, Sheets, parted, weld};
-use geometry::{Point3, Vector3};
+use geometry::{Aabb, Point3, Vector3};
 use part::Part;
 
 /// Edges of the mesh that carries the fields are at most this share of the cutter's radius. Longer ones
@@ -31,6 +31,9 @@ const WELD_OVER_DEVIATION: f64 = 4.0;
 /// Steeper places than this, from the level, are left out, as the cosine
 /// (80°): passes along the surface would lie nearly on top of each other in the plan view.
 pub(crate) const STEEPEST_COSINE: f64 = 0.173_648;
+
+/// A mesh fills the rectangle around it where no more than this share of it lies beside: coordinates are rounded.
+const BESIDE: f64 = 1e-6;
 
 /// A place is covered where the part stands over it by more than this share of the cutter's radius.
 const COVERED_OVER_RADIUS: f64 = 0.01;
@@ -130,6 +133,20 @@ pub(crate) fn wants_mesh(part: &Part, cutter: &Cutter) -> bool {
     let facing: Vec<[u32; 3]> = (0..up.len()).filter(|&t| up[t]).map(|t| mesh.triangles()[t]).collect();
     let holes = compacted(mesh.vertices(), &facing, None).is_ok_and(|(m, _)| m.loops().len() > 1);
     holes || creases > CREASES_OVER_RADIUS * cutter.radius()
+}
+
+/// True where what faces up of a mesh is, seen from above, as large as the rectangle around it. Charts are such
+/// rectangles; what of them lies beside the part would be planned for as well, and a pass over a notch would
+/// come apart.
+pub(crate) fn fills_its_rectangle(part: &Part) -> bool {
+    let mesh = part.mesh();
+    let (mut area, mut around) = (0.0, Aabb::EMPTY);
+    for t in (0..mesh.triangles().len()).filter(|&t| mesh.normal(t).z > STEEPEST_COSINE) {
+        area += mesh.normal(t).z * mesh.area(t);
+        mesh.corners(t).iter().for_each(|corner| around.grow(corner));
+    }
+    let size = around.max - around.min;
+    (area - size.x * size.y).abs() <= BESIDE * area
 }
 
 /// Everything of a part that passes along the surface can reach; `interval` (mm) is their distance on

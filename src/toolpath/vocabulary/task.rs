@@ -1,6 +1,7 @@
 //! What a strategy is asked to cover, with what, and how.
 
 use super::{LevelFunction, Levelled, PassSettings, Passes, PlanError, PlanSettings};
+use crate::surface::mesh_surface::fills_its_rectangle;
 use cutter::Cutter;
 use part::Part;
 use work::monitor::Monitor;
@@ -91,7 +92,9 @@ impl<'a> Task<'a> {
 
     /// Whether streamlines are those of the part's mesh, unless they are asked for otherwise.
     pub fn plans_on_mesh(&self) -> bool {
-        !self.follows_contacts() && self.settings.probe.is_none() && self.wants_mesh
+        let is_free = !self.follows_contacts() && self.settings.probe.is_none();
+        let is_no_rectangle = || self.part.patches().is_empty() && !fills_its_rectangle(self.part);
+        is_free && (self.wants_mesh || is_no_rectangle())
     }
 }
 
