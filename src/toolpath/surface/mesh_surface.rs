@@ -57,9 +57,9 @@ const LEAST_HEIGHT_OVER_DEVIATION: f64 = 10.0;
 /// A strip's outer corner is at most this many widths away from the border's.
 const LONGEST_MITER: f64 = 2.0;
 
-/// A coarser mesh has edges so many times as long: an eighth of the vertices or more, which still show where
-/// curvature changes over the radius of the cutter.
-const COARSER: f64 = 3.0;
+/// A coarser mesh has edges so many times as long: about a quarter of the vertices. With fewer, minima of the
+/// whole mesh that lie near each other are taken for one another.
+const COARSER: f64 = 2.0;
 
 /// The surface that fields stand on, with a strip beyond its borders.
 pub(crate) struct MeshSurface {
