@@ -61,26 +61,35 @@ pub(crate) fn shortest_streams(
         (Objective::Time, None) => Prices { end: 0.5 * task.pace.link, turning: &slowed },
         _ => Prices { end: 0.0, turning: &|_| 0.0 },
     };
-    monitor.start("searching directions", (STARTS + usize::from(further.is_some())) as u64);
-    let mut found = match coarser {
+    let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
+    let gone_on_with = if coarser.is_some() { 2 * most } else { most };
+    let all = STARTS + usize::from(further.is_some()) + gone_on_with;
+    monitor.start("searching directions", all as u64);
+    let starts = match coarser {
         Some((coarse, carry)) => {
             let own = |v: usize| carry.kept[coarse.origin[v] as usize] as usize;
             let count = coarse.mesh.points().len();
-            let there = toward.map(|toward| (0..count).map(|v| toward[own(v)]).collect::<Vec<_>>());
+            let toward = toward.map(|toward| (0..count).map(|v| toward[own(v)]).collect::<Vec<_>>());
+            let further = further.as_ref();
             let further =
                 further.map(|values| coarse.continued((0..count).map(|v| values[own(v)]).collect()));
-            let search = Search::new(coarse, task, there.as_deref(), prices);
-            let found = search.minima_of_starts(coarse, further, monitor)?;
-            let starts = found.into_iter().map(|packed| {
+            let search = Search::new(coarse, task, toward.as_deref(), prices);
+            let found = search.minima_of_starts(coarse, (further, most), monitor)?;
+            let on_finer = |packed: Packed| {
                 let mut values = carry.on_finer(&packed.coefficients[..carry.kept.len()]);
                 values.resize(surface.mesh.points().len(), 0.0);
                 surface.continued(values)
-            });
-            let search = Search::new(surface, task, toward, prices);
-            let Some(minimiser) = search.minimiser() else { return Ok(Vec::new()) };
-            search.minima(&minimiser, starts.collect(), Rounds::Last, monitor)?
+            };
+            found.into_iter().map(on_finer).collect()
         }
-        None => Search::new(surface, task, toward, prices).minima_of_starts(surface, further, monitor)?,
+        None => Vec::new(),
+    };
+    let search = Search::new(surface, task, toward, prices);
+    let mut found = if starts.is_empty() {
+        search.minima_of_starts(surface, (further, most), monitor)?
+    } else {
+        let Some(minimiser) = search.minimiser() else { return Ok(Vec::new()) };
+        search.minima(&minimiser, starts, Rounds::Last, monitor)?
     };
     for packed in &mut found {
         packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
@@ -153,12 +162,12 @@ impl Search {
         Self { sites, gradients, roughness, density, end: prices.end }
     }
 
-    /// To where straight passes and a further start lead: the shortest passes, or the few that promise the least
-    /// time.
+    /// To where straight passes and a further start lead: at most so many functions, the shortest passes or
+    /// what promises the least time.
     fn minima_of_starts(
         &self,
         surface: &MeshSurface,
-        further: Option<Vec<f64>>,
+        (further, most): (Option<Vec<f64>>, usize),
         monitor: &dyn Monitor,
     ) -> Result<Vec<Packed>, Cancelled> {
         let Some(minimiser) = self.minimiser() else { return Ok(Vec::new()) };
@@ -168,7 +177,6 @@ impl Search {
         };
         let starts = (0..STARTS).map(straight).chain(further).collect();
         let found = self.minima(&minimiser, starts, Rounds::First, monitor)?;
-        let most = if self.end > 0.0 { MOST_PLANNED } else { 1 };
         let promising = different(found.into_iter().map(|packed| packed.coefficients), most);
         let mut found = self.minima(&minimiser, promising, Rounds::Last, monitor)?;
         keep_promising(&mut found, self.end, |found| found, |_, _| true);
