@@ -333,3 +333,65 @@ fn streamlines_are_quick_on_parts_that_are_no_rectangle() {
         assert!(time(0) <= 1.02 * time(1), "{name}: {} {}", time(0), time(1));
     }
 }
+
+/// The disk with walls that go down from it and a floor.
+fn solid_disk() -> Vec<[Point3; 3]> {
+    let down = |p: Point3| Point3::new(p.x, p.y, p.z - 5.0);
+    let sector = |[middle, a, b]: [Point3; 3]| {
+        [[middle, a, b], [a, down(a), b], [b, down(a), down(b)], [down(middle), down(b), down(a)]]
+    };
+    disk().into_iter().flat_map(sector).collect()
+}
+
+/// Two square plates of 10 mm.
+fn two_plates() -> Vec<[Point3; 3]> {
+    let plate = |x: f64| {
+        let [a, b, c, d] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]
+            .map(|[u, v]: [f64; 2]| Point3::new(x + u, v, 0.0));
+        [[a, b, c], [a, c, d]]
+    };
+    [0.0, 12.0].into_iter().flat_map(plate).collect()
+}
+
+/// Fronts move over the rectangle around a part, passes and what is predicted of them are those of the part: all of
+/// it is cut in no more time (within 2 %) than by straight passes, and the prediction is that of its area.
+#[test]
+fn fronts_are_cut_on_the_part_alone() {
+    let scene = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[tolerance]\nscallop = 0.02\n\
+                 [[toolpath]]\nstrategy = \"iso-scallop\"\nlinks = \"surface\"\n\
+                 [[toolpath]]\nname = \"rings\"\nstrategy = \"iso-scallop\"\nstart = \"all\"\nlinks = \"surface\"\n\
+                 [[toolpath]]\nstrategy = \"zigzag\"\nangle = \"best\"\nlinks = \"surface\"\n";
+    let strip = 2.0 * (0.02f64 * (4.0 - 0.02)).sqrt();
+    let parts = [
+        ("disk", disk()),
+        ("solid disk", solid_disk()),
+        ("notched plate", notched_plate()),
+        ("plates", two_plates()),
+    ];
+    for (name, triangles) in parts {
+        let home = tempfile::tempdir().unwrap();
+        write_stl(&home.path().join("part.stl"), &triangles);
+        let file = home.path().join("scene.toml");
+        std::fs::write(&file, scene).unwrap();
+        let (code, report) = run_scene(&file);
+        assert_eq!(code, 0, "{name}");
+        let time = |k: usize| number(&report, &format!("/toolpaths/{k}/path/machining_time_s"));
+        assert!(time(0) <= 1.02 * time(2), "{name}: {} {}", time(0), time(2));
+        if name == "disk" {
+            // Rings from its own border, not those of the square around it.
+            assert!(time(1) <= 1.02 * time(2), "{} {}", time(1), time(2));
+        }
+        let area: f64 = triangles.iter().map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).z.max(0.0)).sum();
+        for k in [0, 2] {
+            let notes = report.pointer(&format!("/toolpaths/{k}/notes")).and_then(|notes| notes.as_array());
+            let notes = notes.into_iter().flatten().filter_map(|note| note.as_str());
+            let predicted = |note: &str| {
+                let before = note.split(" mm predicted").next()?.split(" predicted;").next()?;
+                before.rsplit([' ', '(']).next()?.parse::<f64>().ok()
+            };
+            let predicted: f64 = notes.filter(|note| note.contains("predicted")).filter_map(predicted).sum();
+            let exact = area / strip;
+            assert!((predicted / exact - 1.0).abs() < 0.04, "{name}: {predicted} {exact}");
+        }
+    }
+}

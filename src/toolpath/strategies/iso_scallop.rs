@@ -17,9 +17,11 @@
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
+use super::mesh_front;
 use crate::levels::level_passes::along_levelled;
 use crate::levels::spacing::level_tangent;
 use crate::surface::chart::{Chart, ChartPoint};
+use crate::surface::mesh_surface::fills_its_rectangle;
 use crate::vocabulary::{
     Along, Definition, LevelFunction, Levelled, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
 };
@@ -54,7 +56,7 @@ const LENGTH_SAMPLES: usize = 120;
 
 /// How many of the starts with the least predicted length are planned; the prediction leaves out further
 /// passes.
-const PLANNED: usize = 2;
+pub(super) const PLANNED: usize = 2;
 
 /// Where a front starts whose levels are passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,6 +151,11 @@ impl Strategy for IsoScallop {
         if task.wants_mesh && task.part.patches().is_empty() {
             all.notes.push(ROUNDED.to_owned());
         }
+        if self.on_facets(task) {
+            let mut passes = mesh_front::on_part(task, self.start)?;
+            passes.notes.splice(0..0, all.notes);
+            return Ok(passes);
+        }
         let charts = Chart::all(task.part, task.cutter, task.settings.guide())?;
         for (k, chart) in charts.iter().enumerate() {
             all.append(match task.earlier_on_chart(k, charts.len()) {
@@ -157,6 +164,10 @@ impl Strategy for IsoScallop {
             });
         }
         Ok(all)
+    }
+
+    fn on_facets(&self, task: &Task<'_>) -> bool {
+        task.leaves_its_rectangle()
     }
 }
 
@@ -175,6 +186,7 @@ fn on_chart(task: &Task<'_>, chart: &Chart, start: FrontStart) -> Result<Passes,
 }
 
 /// A front from one start.
+#[derive(Clone)]
 pub(crate) struct StartedFront {
     /// Where it starts.
     pub name: &'static str,
@@ -191,11 +203,23 @@ pub(crate) fn fronts(
     chart: &Chart,
     start: FrontStart,
 ) -> Result<Vec<StartedFront>, PlanError> {
-    let Task { cutter, ref settings, monitor, .. } = *task;
-    let places = places(chart, LENGTH_SAMPLES);
+    started(task, chart, starts(chart, start), matches!(start, FrontStart::Line(_)))
+}
+
+/// The fronts from some curves, φ negative on the right of them if `signed`.
+pub(super) fn started(
+    task: &Task<'_>,
+    chart: &Chart,
+    starts: Vec<StartCurves>,
+    signed: bool,
+) -> Result<Vec<StartedFront>, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
+    let mut places = places(chart, LENGTH_SAMPLES);
+    if !fills_its_rectangle(part) {
+        places.0.retain(|([x, y], _)| part.highest_at(*x, *y).is_some());
+    }
     let mut tried = Vec::new();
-    for (name, border, curves) in starts(chart, start) {
-        let signed = matches!(start, FrontStart::Line(_));
+    for (name, border, curves) in starts {
         let field = ScalarField::Grid(arrival(chart, cutter, settings.step, &curves, signed, monitor)?);
         let predicted = predicted_length(&places, cutter, settings.step, &field);
         if let ScalarField::Grid(field) = field {
@@ -242,7 +266,7 @@ pub(crate) fn border_name((parameter, end): (usize, usize)) -> &'static str {
 }
 
 /// Name and border of a start, and its curves in parameters.
-type StartCurves = (&'static str, Option<(usize, usize)>, Vec<Vec<[f64; 2]>>);
+pub(super) type StartCurves = (&'static str, Option<(usize, usize)>, Vec<Vec<[f64; 2]>>);
 
 /// The start curves to try.
 fn starts(chart: &Chart, start: FrontStart) -> Vec<StartCurves> {
@@ -348,7 +372,7 @@ pub(crate) fn places<'a>(chart: &Chart<'a>, n: usize) -> (Vec<([f64; 2], ChartPo
 
 /// Where levels one apart lie farther from each other than the strip by more than this share, which they do
 /// along kinks of a front, further passes will be put in. Less takes the error of coarse grids for kinks.
-const KINK: f64 = 0.05;
+pub(super) const KINK: f64 = 0.05;
 
 /// Length, mm, of the cutter's way along level curves one apart: `∫ |∇φ| (1 − κ r) dA`, κ the curvature along
 /// them; twice that along kinks.

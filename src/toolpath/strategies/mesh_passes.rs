@@ -6,6 +6,8 @@
 //! run through by a smooth curve of the places of the cutter's axis; every height comes from dropping
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
+use super::iso_scallop::{FrontStart, StartedFront};
+use super::mesh_front::{along_surface, best_on_piece, fronts_over, put_on_level};
 use super::mesh_shortest::shortest_streams;
 use super::shortest::{Objective, SEARCHED};
 use super::streamline::FITTED;
@@ -24,7 +26,7 @@ use crate::vocabulary::{
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::mesh::{Bend, FieldMesh, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
-use field::{DIRECTION_WEIGHT, Packed};
+use field::{DIRECTION_WEIGHT, Packed, ScalarField};
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::Part;
 use scallop::{FeedCurvature, strip_width, strip_width_at, widest_strip_at};
@@ -68,6 +70,8 @@ pub(crate) enum Aim<'a> {
     Fitted(&'a FeedDirection, f64, Lines),
     /// Make the path best; with a direction and how much dearer passes square to it are.
     Shortest(Option<(&'a FeedDirection, f64)>, Objective),
+    /// Be the arrival of the front from the start with the shortest path.
+    Front(FrontStart),
 }
 
 /// Passes along the level curves of a stream function over everything of the part that is reached from
@@ -88,7 +92,13 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     if let Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) = aim {
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
-    let reached = reachable(part, cutter, flat)?;
+    // Fronts are spaced by the smooth surface over the mesh; what that leaves at edges is measured.
+    let is_front = matches!(aim, Aim::Front(_));
+    let mut reached = reachable(part, cutter, if is_front { 0.0 } else { flat })?;
+    if is_front {
+        let own = reached.pieces.iter().map(ConnectedPiece::with_own_normals);
+        reached.pieces = own.collect::<Result<_, _>>()?;
+    }
     if reached.steep_area >= LEAST_TOLD {
         all.notes.push(format!(
             "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \
@@ -97,9 +107,19 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
         ));
     }
     let count = reached.pieces.len();
+    let fronts = match aim {
+        Aim::Front(start) if (0..count).any(|k| task.earlier_on_chart(k, count).is_none()) => {
+            fronts_over(task, &reached.pieces, start)?
+        }
+        _ => Vec::new(),
+    };
     for (k, piece) in reached.pieces.iter().enumerate() {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(task, aim, piece, &surface, task.earlier_on_mesh(k, count))?);
+        let earlier = match aim {
+            Aim::Front(_) => task.earlier_on_chart(k, count),
+            _ => task.earlier_on_mesh(k, count),
+        };
+        all.append(on_piece(task, (aim, &fronts), piece, &surface, earlier)?);
     }
     Ok(all)
 }
@@ -109,20 +129,24 @@ const ALONG_BORDERS: &str = "stream function, along borders";
 
 fn on_piece(
     task: &Task<'_>,
-    aim: Aim,
+    (aim, fronts): (Aim, &[StartedFront]),
     piece: &ConnectedPiece,
     surface: &MeshSurface,
-    earlier: Option<(&[f64], &Levelled)>,
+    earlier: Option<&Levelled>,
 ) -> Result<Passes, PlanError> {
     let wanted = match aim {
         Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) => {
             feed::on_mesh(task.part, task.cutter, direction, piece, surface).map_err(refused)?
         }
-        Aim::Shortest(None, _) => Vec::new(),
+        Aim::Shortest(None, _) | Aim::Front(_) => Vec::new(),
     };
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
-    let functions = match (aim, earlier) {
+    let stands_on_it = |levelled: &&Levelled| match &levelled.function {
+        LevelFunction::Mesh(values) => values.len() == surface.mesh.points().len(),
+        LevelFunction::Chart(_) => true,
+    };
+    let functions = match (aim, earlier.filter(stands_on_it)) {
         // A fitted function is solved again, with its notes: that takes little.
         (Aim::Fitted(direction, weight, _), _) => {
             let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
@@ -130,10 +154,9 @@ fn on_piece(
             let function = LevelFunction::Mesh(values.into());
             vec![Levelled { function, planned_as: FITTED.into(), told: None }]
         }
-        (Aim::Shortest(..), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
-            vec![levelled.clone()]
-        }
-        (Aim::Shortest(toward, objective), _) => {
+        (_, Some(levelled)) => vec![levelled.clone()],
+        (Aim::Front(_), None) => best_on_piece(task, fronts, piece),
+        (Aim::Shortest(toward, objective), None) => {
             let lines = toward.map(|(direction, dearer)| {
                 let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
                 let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
@@ -171,6 +194,7 @@ fn on_piece(
         let passes = along_function(task, aim, &piece.mesh, surface, &wanted, levelled)?;
         let worth = match aim {
             Aim::Shortest(_, objective) if several => objective.worth(task, &passes)?,
+            Aim::Front(_) => Objective::Length.worth(task, &passes)?,
             _ => 0.0,
         };
         if best.as_ref().is_none_or(|(least, _)| worth < *least) {
@@ -207,16 +231,22 @@ fn along_function(
     levelled: Levelled,
 ) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let LevelFunction::Mesh(values) = &levelled.function else {
-        return Err(not_applicable("an earlier plan was made on a chart"));
+    let (values, front) = match &levelled.function {
+        LevelFunction::Mesh(values) => (values.clone(), None),
+        LevelFunction::Chart(front) => {
+            let arrival = |p: &Point3| front.value_and_gradient(p.x, p.y)[0];
+            let values = surface.continued(surface.mesh.points().iter().map(arrival).collect());
+            (values.into(), Some(&**front))
+        }
     };
+    let values = &*values;
     let lines = match aim {
         Aim::Fitted(_, _, lines) => lines,
-        Aim::Shortest(..) => Lines::Levels,
+        Aim::Shortest(..) | Aim::Front(_) => Lines::Levels,
     };
     let direction = match aim {
         Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) => Some(direction),
-        Aim::Shortest(None, _) => None,
+        Aim::Shortest(None, _) | Aim::Front(_) => None,
     };
     let of_vertex = |wanted: &Wanted| asked::everywhere(direction?, wanted);
     let parts = if direction.is_some() { PARTS_COMPARED } else { 1 };
@@ -226,7 +256,7 @@ fn along_function(
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
     let drop = DropCutter::watched(part, cutter, monitor)?;
-    let guide = MeshGuide { part, surface, on, parts, cutter, drop, settings, monitor };
+    let guide = MeshGuide { part, surface, on, front, parts, cutter, drop, settings, monitor };
     let places = guide.on.places(surface.own_triangles, |p| guide.allowed_at(p));
     let mut notes = Vec::new();
     let placed = place_levels(&places, range, lines.steps(), &mut notes);
@@ -355,6 +385,9 @@ struct MeshGuide<'a> {
     part: &'a Part,
     surface: &'a MeshSurface,
     on: OnTriangles<'a>,
+    /// The function of the plan view that the values at the vertices are those of. It has sharper kinks than
+    /// triangles.
+    front: Option<&'a ScalarField>,
     /// Contacts from one point of a curve to before the next.
     parts: usize,
     cutter: &'a Cutter,
@@ -435,11 +468,22 @@ impl MeshGuide<'_> {
         })
     }
 
+    /// The gradient along the surface at a point.
+    fn gradient(&self, p: &MeshPoint, normal: &Vector3) -> Vector3 {
+        let own = (p.triangle as usize) < self.surface.own_triangles;
+        if let Some(front) = self.front.filter(|_| own) {
+            let at = self.place(p);
+            let [_, x, y] = front.value_and_gradient(at.x, at.y);
+            return along_surface([x, y], normal);
+        }
+        let gradient = self.on.gradient(p);
+        gradient - normal * normal.dot(&gradient)
+    }
+
     /// Step and width at a point, and whether the surface is too concave there.
     fn allowed_at(&self, p: &MeshPoint) -> Option<(Allowed, bool)> {
         let normal = self.normal(p);
-        let gradient = self.on.gradient(p);
-        let gradient = gradient - normal * normal.dot(&gradient);
+        let gradient = self.gradient(p, &normal);
         let across = gradient.try_normalize(1e-300)?;
         let bend = self.bend(p);
         let step = self.settings.step;
@@ -632,7 +676,13 @@ impl LevelSource for MeshGuide<'_> {
     type Place = Spot;
 
     fn curves(&self, level: f64) -> Vec<Track<Spot>> {
-        self.on.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
+        let mut curves = self.on.curves(level);
+        if let Some(front) = self.front {
+            let own = |p: &&mut MeshPoint| (p.triangle as usize) < self.surface.own_triangles;
+            let points = curves.iter_mut().flat_map(|curve| &mut curve.points).filter(own);
+            points.for_each(|point| put_on_level(front, &self.surface.mesh, point, level));
+        }
+        curves.iter().filter_map(|curve| self.track(curve)).collect()
     }
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {

@@ -9,6 +9,7 @@ pub(crate) mod direction_keys;
 pub(crate) mod iso_parametric;
 pub(crate) mod iso_scallop;
 mod mesh_contours;
+mod mesh_front;
 mod mesh_passes;
 mod mesh_shortest;
 mod offset_mesh;

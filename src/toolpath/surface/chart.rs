@@ -252,7 +252,11 @@ impl<'a> Chart<'a> {
         Self { source: Source::Surface(surface), domain: surface.domain(), sign: 1.0, guide }
     }
 
-    fn of_mesh(part: &'a Part, cutter: &Cutter, guide: Guide<'a>) -> Result<Self, PlanError> {
+    /// The smooth surface over a mesh, on the rectangle around it.
+    ///
+    /// # Errors
+    /// When none can be fitted.
+    pub fn of_mesh(part: &'a Part, cutter: &Cutter, guide: Guide<'a>) -> Result<Self, PlanError> {
         let bounds = part.bounds();
         let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
         // Two facets to a square.

@@ -99,6 +99,27 @@ impl ConnectedPiece {
         self.mesh.triangles()[t].iter().for_each(|&v| bend.add(&self.bends[v as usize], 1.0 / 3.0));
         Some((normal, bend))
     }
+
+    /// The same piece with the normals of its own triangles along its borders. Where walls that are no part of
+    /// it go down from a border, the mean over all triangles leans out half over the edge, and so would passes.
+    ///
+    /// # Errors
+    /// Those of [`FieldMesh::new`].
+    pub fn with_own_normals(&self) -> Result<Self, PlanError> {
+        let mesh = &self.mesh;
+        let mut sums = vec![Vector3::zeros(); mesh.points().len()];
+        for (t, (corners, normals)) in mesh.triangles().iter().zip(&self.corner_normals).enumerate() {
+            corners.iter().zip(normals).for_each(|(&v, normal)| sums[v as usize] += normal * mesh.area(t));
+        }
+        let mut normals = mesh.normals().to_vec();
+        for &v in mesh.loops().iter().flatten() {
+            normals[v as usize] = sums[v as usize].try_normalize(1e-300).unwrap_or(normals[v as usize]);
+        }
+        let (points, triangles) = (mesh.points().to_vec(), mesh.triangles().to_vec());
+        let mesh =
+            FieldMesh::new(points, triangles, Some(normals)).map_err(|e| not_applicable(&e.to_string()))?;
+        Ok(Self { mesh, bends: self.bends.clone(), corner_normals: self.corner_normals.clone() })
+    }
 }
 
 /// What of a part can be planned from above, and what cannot.
@@ -137,8 +158,11 @@ pub(crate) fn wants_mesh(part: &Part, cutter: &Cutter) -> bool {
 
 /// True where what faces up of a mesh is, seen from above, as large as the rectangle around it. Charts are such
 /// rectangles; what of them lies beside the part would be planned for as well, and a pass over a notch would
-/// come apart.
+/// come apart. Patches are all of their charts.
 pub(crate) fn fills_its_rectangle(part: &Part) -> bool {
+    if !part.patches().is_empty() {
+        return true;
+    }
     let mesh = part.mesh();
     let (mut area, mut around) = (0.0, Aabb::EMPTY);
     for t in (0..mesh.triangles().len()).filter(|&t| mesh.normal(t).z > STEEPEST_COSINE) {

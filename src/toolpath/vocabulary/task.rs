@@ -84,17 +84,23 @@ impl<'a> Task<'a> {
     }
 
     /// The function of an earlier plan on one of so many pieces of mesh.
-    pub fn earlier_on_mesh(&self, k: usize, of: usize) -> Option<(&'a [f64], &'a Levelled)> {
-        let levelled = self.earlier(k, of)?;
-        let LevelFunction::Mesh(values) = &levelled.function else { return None };
-        Some((values, levelled))
+    pub fn earlier_on_mesh(&self, k: usize, of: usize) -> Option<&'a Levelled> {
+        self.earlier(k, of).filter(|levelled| matches!(levelled.function, LevelFunction::Mesh(_)))
     }
 
     /// Whether streamlines are those of the part's mesh, unless they are asked for otherwise.
     pub fn plans_on_mesh(&self) -> bool {
-        let is_free = !self.follows_contacts() && self.settings.probe.is_none();
-        let is_no_rectangle = || self.part.patches().is_empty() && !fills_its_rectangle(self.part);
-        is_free && (self.wants_mesh || is_no_rectangle())
+        (self.wants_mesh && self.mesh_serves()) || self.leaves_its_rectangle()
+    }
+
+    /// Whether the part is a mesh beside which lies a part of its chart, so that passes keep to its triangles.
+    pub fn leaves_its_rectangle(&self) -> bool {
+        self.mesh_serves() && !fills_its_rectangle(self.part)
+    }
+
+    /// Whether the cutter that is planned for can follow levels on a mesh.
+    fn mesh_serves(&self) -> bool {
+        !self.follows_contacts() && self.settings.probe.is_none()
     }
 }
 
