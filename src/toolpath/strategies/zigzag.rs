@@ -16,11 +16,9 @@ use crate::levels::spacing::LevelSteps;
 use crate::strategies::mesh_passes::bends_across;
 use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint, dropped_offset};
-use crate::surface::mesh_surface::{ConnectedPiece, reachable, wants_mesh};
+use crate::surface::mesh_surface::{ConnectedPiece, fills_its_rectangle, reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
-use crate::vocabulary::{
-    Definition, Faces, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
-};
+use crate::vocabulary::{Definition, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::ScalarField;
@@ -208,7 +206,7 @@ fn on_levels(task: &Task<'_>, angle: f64, steps: LevelSteps) -> Result<Passes, P
 fn best(task: &Task<'_>, steps: LevelSteps) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
-    let nets: Vec<Net<'_>> = charts.iter().map(|chart| Net::of(chart, &settings.faces)).collect();
+    let nets: Vec<Net<'_>> = charts.iter().map(|chart| Net::of(chart, task)).collect();
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();
     let (given, ground) = match settings.step {
@@ -273,20 +271,24 @@ fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
     [low.min(value), high.max(value)]
 }
 
-/// A chart's points on faces that are asked for, at the nodes of a grid over all of it.
+/// A chart's points on faces of the part that are asked for, at the nodes of a grid over all of it.
 struct Net<'a> {
     nodes: Vec<Option<(ChartPoint<'a>, f64)>>,
 }
 
 impl<'a> Net<'a> {
     /// Each with the area that it stands for, mm².
-    fn of(chart: &Chart<'a>, faces: &Faces) -> Self {
+    fn of(chart: &Chart<'a>, task: &Task<'_>) -> Self {
+        let Task { part, ref settings, .. } = *task;
+        let all_is_part = fills_its_rectangle(part);
+        let on_part = |[u, v]: [f64; 2]| all_is_part || part.highest_at(u, v).is_some();
         let ([[u0, u1], [v0, v1]], n) = (chart.domain, NET_CELLS);
         let at = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / n as f64;
         let share = |k: usize| if k == 0 || k == n { 0.5 } else { 1.0 };
         let node = |k: usize| {
             let (i, j) = (k % (n + 1), k / (n + 1));
-            let p = chart.at(at(u0, u1, i), at(v0, v1, j)).filter(|p| faces.hold(&p.normal))?;
+            let uv = [at(u0, u1, i), at(v0, v1, j)];
+            let p = chart.at(uv[0], uv[1]).filter(|p| settings.faces.hold(&p.normal) && on_part(uv))?;
             let (e, f, g) = p.jet.first_form();
             let cell = (u1 - u0) * (v1 - v0) / (n * n) as f64;
             Some((p, share(i) * share(j) * cell * (e * g - f * f).max(0.0).sqrt()))
@@ -377,7 +379,7 @@ impl<'a> Ground<'a> {
         let has_creases = part.patches().is_empty() && wants_mesh(part, cutter);
         // What is no surface still has heights for charts.
         let Some(reached) = has_creases.then(|| reachable(part, cutter, 0.0).ok()).flatten() else {
-            return Self::Charts(charts.iter().map(|chart| Net::of(chart, &settings.faces)).collect());
+            return Self::Charts(charts.iter().map(|chart| Net::of(chart, task)).collect());
         };
         let correction = settings.guide().correction;
         let facet = |piece: &ConnectedPiece, t: usize| {
