@@ -219,8 +219,10 @@ impl ExcessSearch<'_> {
                         }
                         let enough = here + if is_reached { slack } else { NUMERICAL_FLOOR };
                         // Where no pass came down to the design, all around is as high.
-                        let is_uncut = rises && !is_reached && half <= small;
-                        (possible, possible > known.max(enough) && !is_uncut)
+                        if rises && !is_reached && half <= small {
+                            continue;
+                        }
+                        (possible, possible > known.max(enough))
                     }
                 };
                 if is_open && half > smallest {

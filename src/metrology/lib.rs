@@ -41,6 +41,7 @@ mod facing;
 mod figures;
 #[cfg(test)]
 mod flat_scene;
+mod hollow;
 mod inspected;
 mod inspection;
 mod measure;
