@@ -94,11 +94,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     }
     // Fronts are spaced by the smooth surface over the mesh; what that leaves at edges is measured.
     let is_front = matches!(aim, Aim::Front(_));
-    let mut reached = reachable(part, cutter, if is_front { 0.0 } else { flat })?;
-    if is_front {
-        let own = reached.pieces.iter().map(ConnectedPiece::with_own_normals);
-        reached.pieces = own.collect::<Result<_, _>>()?;
-    }
+    let reached = reachable(part, cutter, if is_front { 0.0 } else { flat })?;
     if reached.steep_area >= LEAST_TOLD {
         all.notes.push(format!(
             "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \

@@ -6,7 +6,7 @@
 //! dropping the cutter on the part itself, as always.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 use crate::vocabulary::PlanError;
 use cutter::Cutter;
@@ -99,27 +99,6 @@ impl ConnectedPiece {
         self.mesh.triangles()[t].iter().for_each(|&v| bend.add(&self.bends[v as usize], 1.0 / 3.0));
         Some((normal, bend))
     }
-
-    /// The same piece with the normals of its own triangles along its borders. Where walls that are no part of
-    /// it go down from a border, the mean over all triangles leans out half over the edge, and so would passes.
-    ///
-    /// # Errors
-    /// Those of [`FieldMesh::new`].
-    pub fn with_own_normals(&self) -> Result<Self, PlanError> {
-        let mesh = &self.mesh;
-        let mut sums = vec![Vector3::zeros(); mesh.points().len()];
-        for (t, (corners, normals)) in mesh.triangles().iter().zip(&self.corner_normals).enumerate() {
-            corners.iter().zip(normals).for_each(|(&v, normal)| sums[v as usize] += normal * mesh.area(t));
-        }
-        let mut normals = mesh.normals().to_vec();
-        for &v in mesh.loops().iter().flatten() {
-            normals[v as usize] = sums[v as usize].try_normalize(1e-300).unwrap_or(normals[v as usize]);
-        }
-        let (points, triangles) = (mesh.points().to_vec(), mesh.triangles().to_vec());
-        let mesh =
-            FieldMesh::new(points, triangles, Some(normals)).map_err(|e| not_applicable(&e.to_string()))?;
-        Ok(Self { mesh, bends: self.bends.clone(), corner_normals: self.corner_normals.clone() })
-    }
 }
 
 /// What of a part can be planned from above, and what cannot.
@@ -203,7 +182,6 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
     }
     let creases = refined.creases(LEAST_HEIGHT_OVER_DEVIATION * part.mesh_deviation());
     let corner_normals = refined.corner_normals(&normals, &creases);
-    sharpen(&refined, &creases, &normals, &mut bends, cutter, interval);
     let highest_above = COVERED_OVER_RADIUS * cutter.radius() + 2.0 * part.mesh_deviation();
     let state = work::parallel::map(refined.triangles.len(), |t| {
         let [a, b, c] = refined.triangles[t].map(|i| refined.points[i as usize]);
@@ -220,6 +198,9 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
             _ => State::Open,
         }
     });
+    own_normals(&refined, &state, &corner_normals, &mut normals);
+    let inner = between_open(&refined, &state, &creases);
+    sharpen(&refined, &inner, &normals, &mut bends, cutter, interval);
     let steep_area = state.iter().map(|s| if let State::Steep(area) = s { *area } else { 0.0 }).sum();
     let kept: Vec<usize> = (0..state.len()).filter(|&t| matches!(state[t], State::Open)).collect();
     let open: Vec<[u32; 3]> = kept.iter().map(|&t| refined.triangles[t]).collect();
@@ -250,12 +231,48 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
     Ok(Reachable { pieces, steep_area })
 }
 
+/// Gives the points that what is left out meets the mean normals of the other triangles around them: where a
+/// wall goes down from a rim, the mean over all leans out half over the edge, and so would passes.
+fn own_normals(refined: &Refined, state: &[State], corner_normals: &[[Vector3; 3]], normals: &mut [Vector3]) {
+    let mut meets = vec![false; normals.len()];
+    let mut sums = vec![Vector3::zeros(); normals.len()];
+    for ((corners, state), own) in refined.triangles.iter().zip(state).zip(corner_normals) {
+        let [a, b, c] = corners.map(|i| refined.points[i as usize]);
+        let area = 0.5 * (b - a).cross(&(c - a)).norm();
+        for (&v, normal) in corners.iter().zip(own) {
+            match state {
+                State::Open => sums[v as usize] += normal * area,
+                State::Steep(_) | State::Below => meets[v as usize] = true,
+            }
+        }
+    }
+    for v in (0..normals.len()).filter(|&v| meets[v]) {
+        normals[v] = sums[v].try_normalize(1e-300).unwrap_or(normals[v]);
+    }
+}
+
+/// Of the creases that stand out those between two triangles that are reached. At a rim passes end as at
+/// every border.
+fn between_open(refined: &Refined, state: &[State], creases: &[([u32; 2], bool)]) -> Vec<[u32; 2]> {
+    let mut sides: HashMap<[u32; 2], u32> = creases.iter().filter(|c| c.1).map(|c| (c.0, 0)).collect();
+    for (corners, _) in refined.triangles.iter().zip(state).filter(|(_, state)| matches!(state, State::Open))
+    {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            if let Some(count) = sides.get_mut(&[a.min(b), a.max(b)]) {
+                *count += 1;
+            }
+        }
+    }
+    creases.iter().map(|c| c.0).filter(|edge| sides.get(edge) == Some(&2)).collect()
+}
+
 /// Gives sharp edges the curvature that halves the interval across them. Passes on both sides of an edge
 /// do not reach over it: each has to leave no more than the scallop up to the edge, so the last of them
 /// must be within half an interval of it, wherever the other one is.
 fn sharpen(
     refined: &Refined,
-    creases: &[([u32; 2], bool)],
+    creases: &[[u32; 2]],
     normals: &[Vector3],
     bends: &mut [Bend],
     cutter: &Cutter,
@@ -263,8 +280,7 @@ fn sharpen(
 ) {
     let mut edge_at: Vec<Option<Vector3>> = vec![None; normals.len()];
     let mut open = BinaryHeap::new();
-    for ([a, b], _) in creases.iter().filter(|c| c.1) {
-        let (a, b) = (*a, *b);
+    for &[a, b] in creases {
         let along = refined.points[b as usize] - refined.points[a as usize];
         for v in [a, b] {
             edge_at[v as usize] = Some(along);
