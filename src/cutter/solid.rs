@@ -252,6 +252,12 @@ impl Solid {
         Self::stacked(Some(cutter), holder.map_or(free, Holder::cutting_length), &[])
     }
 
+    /// What of the cutter leads when it goes back along its axis: its profile, and of the cylinder above no more
+    /// than a flat end takes to be as high as it is wide.
+    pub fn of_end(cutter: &Cutter) -> Self {
+        Self::stacked(Some(cutter), cutter.side_height().max(cutter.radius()), &[])
+    }
+
     /// Shank and holder alone, without the cutter.
     pub fn of_holder(holder: &Holder) -> Self {
         Self::stacked(None, holder.cutting_length(), &slants(holder))

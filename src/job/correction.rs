@@ -40,7 +40,7 @@ pub(crate) use looking::Looked;
 use next::{EVENLY_HIGH, are_ends_alone, changes};
 pub(crate) use round::{CorrectionFigures, CorrectionRound};
 use round::{Gain, Goal};
-use standing::{Standing, Wanted, cutting_length, digest, too_near};
+use standing::{Cut, Standing, Wanted, cutting_length, digest, too_near};
 use widths::Widths;
 
 /// Most plans that are made while only ridges are measured.
@@ -111,6 +111,8 @@ struct Corrected<'a> {
     /// What a plan that holds the target was planned by, as far as ridges tell, before a wider one took its
     /// place.
     narrower: Option<Widths>,
+    /// What the best plan was planned by before passes of its own came to it, as far as ridges told.
+    untouched: Option<Widths>,
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
@@ -192,6 +194,7 @@ impl Session {
             tried,
             latest: None,
             narrower: None,
+            untouched: None,
             rounds,
             kept: 0,
             made: Vec::new(),
@@ -207,6 +210,7 @@ impl Session {
                 corrected.look_at_best(closeness, monitor)?
             }
         };
+        let looked = corrected.unless_touched_up_too_deep(looked, monitor)?;
         let Looked { measured, covered, .. } = corrected.by_measurements(looked, monitor)?;
         let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
@@ -268,6 +272,23 @@ impl Corrected<'_> {
         self.tried.standing.above.extend(others.iter().map(|place| (place.at, place.height)));
         // The others are no reason to place all passes anew.
         Ok(self.next(1, slack).unwrap_or(next))
+    }
+
+    /// Measures the plan before passes of its own came to it, where the best one cuts too deep: ridges alone
+    /// do not tell how deep such passes cut.
+    fn unless_touched_up_too_deep(
+        &mut self,
+        looked: Looked,
+        monitor: &dyn Monitor,
+    ) -> Result<Looked, JobError> {
+        let is_too_deep = self.cut_of(&self.tried.standing) > Cut::Allowed;
+        let Some(before) = self.untouched.take().filter(|_| is_too_deep) else { return Ok(looked) };
+        // It cuts too deep. Two at a time might be more than the memory that the run may take.
+        drop(looked);
+        let (planned, factors) = self.plan(&before, monitor)?;
+        let (again, found, gain) = self.compared(&planned, factors, false, monitor)?;
+        self.keep_if(gain, planned, before, found);
+        if gain == Gain::None { self.look_at_best(self.closeness, monitor) } else { Ok(again) }
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
@@ -347,13 +368,14 @@ impl Corrected<'_> {
     /// too deep or leaves more uncut.
     fn gain(&self, found: &Standing, passes: [bool; 2]) -> Gain {
         let (limits, best) = (&self.session.scene.tolerance, &self.tried.standing);
-        let is_deeper = found.depth > limits.gouge && best.depth <= limits.gouge;
+        let [cut, cut_before] = [found, best].map(|standing| self.cut_of(standing));
         let leaves_more = found.unreached > limits.uncut && best.unreached <= limits.uncut;
         match (passes, [best.is_never_cut, found.is_never_cut]) {
             ([false, true], _) => Gain::Much,
             ([true, false], _) | (_, [false, true]) => Gain::None,
-            _ if is_deeper || leaves_more => Gain::None,
+            _ if cut > cut_before || leaves_more => Gain::None,
             (_, [true, false]) => Gain::Much,
+            _ if cut < cut_before => Gain::Much,
             _ => found.round.gain_over(&best.round, &self.goal),
         }
     }
@@ -420,7 +442,11 @@ impl Corrected<'_> {
     }
 
     fn is_far_too_deep(&self) -> bool {
-        self.tried.standing.depth > NEVER_CUT * self.session.scene.tolerance.gouge
+        self.cut_of(&self.tried.standing) == Cut::FarTooDeep
+    }
+
+    fn cut_of(&self, standing: &Standing) -> Cut {
+        Cut::of(standing.depth, self.session.scene.tolerance.gouge)
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -521,6 +547,10 @@ impl Corrected<'_> {
         self.rounds.push(found.round);
         let tried = Tried { widths, standing: found, kept: planned.plan.kept.clone() };
         self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
+        self.untouched = match (tried.standing.round.measured, tried.widths.touch_up.is_empty()) {
+            (false, false) => self.untouched.take().or_else(|| Some(self.tried.widths.clone())),
+            _ => None,
+        };
         self.is_complete &= tried.widths.is_alike(&self.tried.widths);
         (self.best, self.tried, self.latest, self.kept) = (planned, tried, None, self.rounds.len() - 1);
         self.remember_best();

@@ -8,9 +8,9 @@ use motion::Toolpath;
 use part::Part;
 use toolpath::Faces;
 
-use super::SLACK;
 use super::looking::Looked;
 use super::round::CorrectionRound;
+use super::{NEVER_CUT, SLACK};
 use crate::judge::highest_reached;
 use crate::planned::Planned;
 
@@ -84,7 +84,8 @@ impl Standing {
         let ridge = scallop.max_at_mm.map(|at| (at.into(), highest));
         let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
-        let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
+        let gouge = &measured.gouge;
+        let depth = gouge.at_least_mm.max(gouge.max_depth_mm - gouge.error_bound_mm);
         let of_unseen = unseen.map_or(0.0, |unseen| unseen.excess.unreached.at_least_mm);
         let unreached = measured.excess.unreached.at_least_mm.max(of_unseen);
         let is_never_cut = looked.is_never_cut();
@@ -120,6 +121,26 @@ impl Standing {
         round.highest_mm = round.highest_mm.min(highest);
         round.border_mm = round.border_mm.map(|border| border.min(highest));
         self
+    }
+}
+
+/// How deep a plan cuts below the design, against how deep it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Cut {
+    Allowed,
+    TooDeep,
+    /// Deeper by more times than widths change anything at.
+    FarTooDeep,
+}
+
+impl Cut {
+    /// Of a depth and the gouge tolerance, mm.
+    pub(super) fn of(depth: f64, gouge: f64) -> Self {
+        match depth {
+            _ if depth > NEVER_CUT * gouge => Self::FarTooDeep,
+            _ if depth > gouge => Self::TooDeep,
+            _ => Self::Allowed,
+        }
     }
 }
 

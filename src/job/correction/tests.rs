@@ -186,3 +186,47 @@ fn a_plan_that_comes_out_as_an_earlier_one_is_not_measured_again() {
     // The best one may be looked at once more, closer.
     assert!(paths < plans && looks <= paths + 1, "{looks} {paths} {plans} {rounds:?}");
 }
+
+/// As far as ridges tell, short passes made a plan better; measured, it cuts 0.2 mm deep. The plan before them is
+/// taken up, and no such plan takes its place again.
+#[test]
+fn short_passes_that_cut_too_deep_give_way_to_the_plan_before_them() {
+    let text = format!("{SCENE}[[toolpath]]\nstrategy = \"iso-parametric\"\n");
+    let session = Session::new(Scene::parse("deep.toml", text).unwrap()).unwrap();
+    let (request, target) = (&session.scene.toolpaths[0], 0.05);
+    let (tool, engine) = (crate::tool::Tool::of(&request.tooling), session.engine(request).unwrap());
+    let around = Around { tool: &tool, near: &session.part, fixtures: &[], rest: None };
+    let [before, mut deep] = [0, 1].map(|_| session.plan(request, around, None, &Silent).unwrap());
+    deep.plan.path = deep.plan.path.moved(geometry::Vector3::new(0.0, 0.0, -0.2));
+    let (closeness, wanted) = (Closeness::Verdict, session.wanted(request, target, false));
+    let looked = session.look(request, &[], engine, &deep.plan.path, closeness, &Silent).unwrap();
+    let standing = Standing::of_all(&looked, &deep, [1.0; 2], wanted);
+    let widths = Widths::by_calculation(plane_interval(&request.tooling.cutter, request.step));
+    let touched_up = Widths { touch_up: vec![geometry::Point3::origin()], ..widths.clone() };
+    let kept = deep.plan.kept.clone();
+    let mut corrected = Corrected {
+        session: &session,
+        request,
+        earlier: &[],
+        around,
+        engine,
+        goal: Goal { target, rule: session.scene.scallop_rule },
+        closeness,
+        best: deep,
+        rounds: vec![standing.round],
+        tried: Tried { widths: touched_up, standing: standing.clone(), kept },
+        latest: None,
+        narrower: None,
+        untouched: Some(widths),
+        kept: 0,
+        made: Vec::new(),
+        is_complete: false,
+        is_hopeless: false,
+        least_left: 0.0,
+    };
+    assert_eq!(corrected.cut_of(&standing), Cut::FarTooDeep);
+    let looked = corrected.unless_touched_up_too_deep(looked, &Silent).unwrap();
+    assert_eq!(corrected.best.plan.path.moves, before.plan.path.moves);
+    assert!(looked.measured.measurement.gouge.max_depth_mm < 0.005 && corrected.kept == 1);
+    assert_eq!(corrected.gain(&standing, [false; 2]), Gain::None);
+}

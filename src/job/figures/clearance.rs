@@ -9,9 +9,9 @@ use collision::{LeastClearance, Obstacle};
 use cutter::{Cutter, Solid};
 use metrology::View;
 use motion::{Move, MoveKind, Toolpath};
-use report::{Claim, Figure, FigureTable, Gravity, capital, place};
+use report::{Claim, Figure, FigureTable, Gravity, Verdict, capital, place};
 use serde::Serialize;
-use sim::{FAR, VoxelEngine, holder_clearance};
+use sim::{ENGAGED, FAR, VoxelEngine, holder_clearance};
 use work::monitor::Monitor;
 
 use super::removal::{TOOLS_BEFORE, doubt};
@@ -21,10 +21,21 @@ use crate::run::{Finding, Run};
 use crate::tool::{Tool, ToolMoves};
 
 mod bodies;
+mod lifts;
 mod uncut;
+
+use lifts::{lifts, with_rapids};
 
 /// Differences of distances that the search along moves leaves open, mm.
 const RESOLUTION: f64 = 2e-5;
+
+/// Rapid moves, but for those that lift the cutter out of what it has just cut: what it cut in, it may also
+/// touch.
+const RAPIDS: &str = "cutter on rapid moves";
+const LIFTS: &str = "cutter lifting at rapid rate";
+
+/// What would decide whether they touch the part.
+const FARTHER: &str = "more distance there would decide it";
 
 /// The stock that stands when a move comes.
 const STANDING: &str = "standing stock";
@@ -150,12 +161,10 @@ fn with_meshes(
     let (tool, near) = (Tool::new(moves.cutter, moves.holder), run.around.near);
     let astray = |solid: &Solid| strays(&moves.path, &tool.cutter, solid);
     let mut pairs = Vec::new();
-    let mut add = |name: (&str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
-        let rapids = |to: &Move| to.kind == MoveKind::Rapid;
-        let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
-        let least = obstacle.least_clearance(solid, &moves.path, chosen, monitor)?;
+    let mut add = |name: (&str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64| {
+        let least = obstacle.least_clearance(solid, &moves.path, &|_| true, monitor)?;
         let off = off + astray(solid);
-        let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, needed);
+        let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, 0.0);
         pairs.extend(least.map(of_mesh));
         Ok::<(), JobError>(())
     };
@@ -163,18 +172,45 @@ fn with_meshes(
     let files = run.scene().keep_clear.fixtures.iter().map(|fixture| &fixture.file.written);
     for ((mesh, bvh), file) in run.around.fixtures.iter().zip(files) {
         let fixture = Obstacle::new(mesh, bvh);
-        add(("cutter", file.clone()), &tool.cutter, fixture, 0.0, 0.0)?;
+        add(("cutter", file.clone()), &tool.cutter, fixture, 0.0)?;
         if let Some(holder) = &tool.holder {
-            add(("holder", file.clone()), holder, fixture, 0.0, 0.0)?;
+            add(("holder", file.clone()), holder, fixture, 0.0)?;
         }
     }
     let (part, off) = (Obstacle::new(near.mesh(), near.bvh()), near.mesh_deviation());
     if let Some(holder) = &tool.holder {
-        add(("holder", "part".into()), holder, part, off, 0.0)?;
+        add(("holder", "part".into()), holder, part, off)?;
     }
-    // What it may cut in, it may also touch.
-    add(("cutter on rapid moves", "part".into()), &tool.cutter, part, off, -run.scene().tolerance.gouge)?;
+    pairs.extend(rapids_with_part(run, moves, &tool.cutter, (part, off + astray(&tool.cutter)), monitor)?);
     Ok(pairs)
+}
+
+/// The cutter on rapid moves against the part, whose triangles and program are off by up to `off`; where one
+/// may touch it, lifts out of what was cut by themselves.
+fn rapids_with_part(
+    run: &Run<'_>,
+    moves: &ToolMoves<'_>,
+    cutter: &Solid,
+    (part, off): (Obstacle<'_>, f64),
+    monitor: &dyn Monitor,
+) -> Result<Vec<PairClearance>, JobError> {
+    let of_path = |name: &str, path: &Toolpath, needed: f64| {
+        let least = part.least_clearance(cutter, path, &|to: &Move| to.kind == MoveKind::Rapid, monitor)?;
+        let of_mesh =
+            |least| PairClearance::of_mesh((name, "part".into()), &least, (run, moves.first), off, needed);
+        Ok::<_, JobError>(least.map(of_mesh))
+    };
+    let all = of_path(RAPIDS, &moves.path, -ENGAGED)?;
+    let may_touch = |pair: &PairClearance| pair.claim(run).verdict() != Verdict::Pass;
+    if !all.as_ref().is_some_and(may_touch) {
+        return Ok(all.into_iter().collect());
+    }
+    let lifts = lifts(part, &Solid::of_end(moves.cutter), &moves.path, off);
+    let others = with_rapids(&moves.path, |k| !lifts[k]);
+    let lifts = with_rapids(&moves.path, |k| lifts[k]);
+    let others = of_path(RAPIDS, &others, -ENGAGED)?;
+    let lifts = of_path(LIFTS, &lifts, -run.scene().tolerance.gouge)?;
+    Ok(others.into_iter().chain(lifts).collect())
 }
 
 /// How far the program may be off the moves at the upper end of a solid, mm.
@@ -263,8 +299,10 @@ impl PairClearance {
             None => return claim(-FAR, bound).told(self.sentence()),
             Some(clearance) => clearance,
         };
-        if clearance >= self.needed {
-            return claim(-clearance, bound).told(self.sentence());
+        // Within what triangles stand off their surface it may be none.
+        if clearance + self.off >= self.needed {
+            let claim = claim(-clearance, bound).told(self.sentence());
+            return if self.needed < 0.0 { Claim { decided_by: FARTHER, ..claim } } else { claim };
         }
         let index = self.move_index.unwrap_or_default();
         let text = format!(

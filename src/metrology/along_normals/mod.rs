@@ -118,6 +118,11 @@ pub trait AlongNormal: Sync {
     /// How far inward is looked, mm.
     fn depth(&self) -> f64;
 
+    /// How much deeper what is cut as deep as is looked may be, mm.
+    fn beyond_depth(&self) -> f64 {
+        0.0
+    }
+
     /// How deep anything is cut at most along lines no farther than `aside` mm from that through `point`
     /// along `normal`, mm.
     fn depth_at_most(&self, _point: &Point3, _normal: &Vector3, _aside: f64) -> f64 {
@@ -340,8 +345,10 @@ impl Along<'_> {
         let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
         gouge.max_depth_mm = greatest.depth;
         gouge.at_least_mm = greatest.depth_at_least;
+        let is_deeper = greatest.depth >= self.engine.depth();
+        let beyond = if is_deeper { self.engine.beyond_depth() } else { 0.0 };
         gouge.error_bound_mm =
-            left.depth + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
+            left.depth + (greatest.possible_depth - greatest.depth).max(0.0) + beyond + NUMERICAL_FLOOR;
         if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
             (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
         }

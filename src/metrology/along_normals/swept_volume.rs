@@ -362,6 +362,10 @@ impl AlongNormal for SweptVolume<'_> {
         self.inward
     }
 
+    fn beyond_depth(&self) -> f64 {
+        (self.block.diagonal() - self.inward).max(0.0)
+    }
+
     fn depth_at_most(&self, point: &Point3, normal: &Vector3, aside: f64) -> f64 {
         -self.cut.free_up_to(point, normal, [-self.inward, 0.0], aside)
     }

@@ -126,6 +126,25 @@ fn a_look_at_ridges_alone_finds_their_heights_and_what_stands_along_borders() {
     }
 }
 
+/// A pass 1 mm deep, where no deeper than 0.6 mm is looked: that is cut for certain, and the bound holds the
+/// rest.
+#[test]
+fn what_is_cut_deeper_than_is_looked_has_a_bound_that_holds_it() {
+    let (part, path) = (plane([4.0, 3.0]), path(&passes(1.0)));
+    let cutter = Cutter::ball(2.0 * RADIUS).unwrap();
+    let solid = Solid::of_cutter(&cutter, None);
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    for (reach, bound) in [(0.6, f64::INFINITY), (1.5, 1e-3)] {
+        let cut = swept(&part, &by_rays, reach);
+        let (measured, _) =
+            measure_along_normals(&part, &cutter, &path, &cut, 0.2, &LIMITS, 1e-4, None, &Silent).unwrap();
+        let gouge = &measured.gouge;
+        assert!((gouge.max_depth_mm - 1.0).abs() <= gouge.error_bound_mm, "{gouge:?}");
+        assert!(gouge.error_bound_mm < bound && gouge.at_least_mm > reach.min(1.0) - 1e-3, "{gouge:?}");
+    }
+}
+
 #[test]
 fn a_gouge_is_found_with_its_depth_area_and_move() {
     let (measured, _) = measured(&plane([4.0, 3.0]), &path(&passes(0.03)), 0.1);

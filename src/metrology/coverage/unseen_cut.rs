@@ -169,6 +169,10 @@ impl AlongNormal for UnseenCut<'_> {
         self.cut.depth()
     }
 
+    fn beyond_depth(&self) -> f64 {
+        self.cut.beyond_depth()
+    }
+
     fn depth_at_most(&self, point: &Point3, normal: &Vector3, aside: f64) -> f64 {
         let depth = self.cut.depth_at_most(point, normal, aside);
         // A cut is no deeper than belongs to the place.

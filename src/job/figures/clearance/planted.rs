@@ -150,7 +150,7 @@ fn a_shank_alone_against_standing_stock() {
     }
 }
 
-/// A rapid move of the cutter into the plate counts from beyond the gouge tolerance on; feeds are gouges.
+/// A rapid move of the cutter into the plate collides with it; feeds are gouges.
 #[test]
 fn a_cutter_on_rapid_moves_against_the_part() {
     for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
@@ -161,4 +161,72 @@ fn a_cutter_on_rapid_moves_against_the_part() {
         let tip = [4.0, 3.0, gap + 3.0 - 3.0 * axis[1]];
         holds(&case.run(tip), "cutter on rapid moves", "part", gap);
     }
+}
+
+/// A cutter that lifts out of what a feed has cut by the gouge tolerance touches it; any other rapid move that
+/// is as deep in the part collides with it.
+#[test]
+fn rapid_moves_may_lift_a_cutter_out_of_its_cut_and_no_more() {
+    let home = Home::new("lifts");
+    home.solid("box.stl", [0.0, 0.0, -10.0], [8.0, 6.0, 10.0]);
+    let run = |moves: &[(&str, [f64; 3])]| {
+        let moves: String =
+            moves.iter().map(|(kind, [x, y, z])| format!("{kind}\nGOTO/{x},{y},{z}\n")).collect();
+        home.write("path.cls", &format!("UNITS/MM\nSPINDL/8000,CLW\n{moves}FINI\n"));
+        home.opened(
+            "[part]\nfile = \"box.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[[toolpath]]\n\
+             strategy = \"program\"\nfile = \"path.cls\"\n",
+        )
+    };
+    let (rapid, feed) = ("RAPID", "FEDRAT/800,MMPM");
+    let above = (rapid, [20.0, 3.0, 60.0]);
+    // 3 µm in the wall at x = 8, whose top is 10 mm up.
+    let beside = |kind, z: f64| (kind, [10.997, 3.0, z]);
+    let (lifting, others) = ("cutter lifting at rapid rate", "cutter on rapid moves");
+    for moves in [
+        [above, (rapid, [20.0, 3.0, 0.0]), beside(feed, 0.0), beside(rapid, 30.0), above],
+        [above, (rapid, [20.0, 3.0, 0.0]), beside(feed, 0.0), beside(rapid, 4.0), beside(rapid, 30.0)],
+    ] {
+        let result = run(&moves);
+        let found = of_pair(&result, lifting, "part");
+        assert_eq!(found.verdict(), Verdict::Pass, "{found:?}");
+        assert!((found.measured.unwrap() - 0.003).abs() <= found.error_bound, "{found:?}");
+        let found = of_pair(&result, others, "part");
+        assert!(found.verdict() == Verdict::Pass && found.measured.unwrap() < -0.9, "{found:?}");
+    }
+    // Past the wall, down along it, and out of it aslant.
+    for moves in [
+        [
+            above,
+            (rapid, [10.997, -20.0, 0.0]),
+            (rapid, [10.997, 30.0, 0.0]),
+            (rapid, [20.0, 30.0, 0.0]),
+            above,
+        ],
+        [above, beside(rapid, 30.0), beside(rapid, 0.0), beside(feed, -1.0), (feed, [20.0, 3.0, 0.0])],
+        [above, beside(feed, 0.0), (rapid, [10.997, 4.0, 4.0]), (rapid, [20.0, 3.0, 4.0]), above],
+    ] {
+        let result = run(&moves);
+        let found = of_pair(&result, others, "part");
+        assert_eq!(found.verdict(), Verdict::Fail, "{found:?}");
+        assert!(found.measured.unwrap() > 0.002, "{found:?}");
+    }
+}
+
+/// A lip over a wall, 3 µm in the way of a lift that touches nothing where it begins, while the shank stood
+/// beside the lip.
+#[test]
+fn what_the_end_of_a_cutter_meets_on_a_lift_collides() {
+    let home = Home::new("lip");
+    home.solid("lip.stl", [0.0, 0.0, 8.0], [8.0, 6.0, 12.0]);
+    let (rapid, feed) = ("RAPID", "FEDRAT/800,MMPM");
+    let program = [(rapid, 60.0), (feed, 0.0), (rapid, 60.0)];
+    let moves = program.map(|(kind, z)| format!("{kind}\nGOTO/10.997,3,{z}\n")).concat();
+    home.write("path.cls", &format!("UNITS/MM\nSPINDL/8000,CLW\n{moves}FINI\n"));
+    let result = home.opened(
+        "[part]\nfile = \"lip.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[[toolpath]]\n\
+         strategy = \"program\"\nfile = \"path.cls\"\n",
+    );
+    let found = of_pair(&result, "cutter on rapid moves", "part");
+    assert_eq!(found.verdict(), Verdict::Fail, "{found:?}");
 }

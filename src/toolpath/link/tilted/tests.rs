@@ -5,7 +5,7 @@ use crate::vocabulary::{Joining, Step};
 use crate::{Zigzag, plan_tilted};
 use collision::{Check, Obstacle};
 use cutter::{Holder, HolderSection, Solid};
-use geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
+use geometry::{AnalyticShape, AnalyticSurface, Bvh, NurbsSurface, TriangleMesh, Vector3};
 use motion::ToolAxis;
 use part::{Part, Patch};
 use work::monitor::Silent;
@@ -247,5 +247,49 @@ fn through_standing_stock_the_tool_goes_down_at_the_plunge_rate() {
         let down = fed.map(|(a, b, m)| (a - b).dot(&m.to.axis) / (b - a).norm() * m.feed_rate);
         let fastest = down.fold(0.0, f64::max);
         assert!(fastest > 299.0 && fastest <= 300.0 * (1.0 + 1e-9), "{lean} {links:?}: {fastest}");
+    }
+}
+
+/// A second face of the part 0.05 mm beside the way out along the axis: no rapid move runs so near to it.
+#[test]
+fn past_another_face_the_tool_goes_out_at_the_feed() {
+    let (axis, aside) = (Vector3::new(0.5, 0.0, 0.75f64.sqrt()), Vector3::new(-(0.75f64.sqrt()), 0.0, 0.5));
+    let centre = Point3::new(10.0, 10.0, 3.0);
+    let face = |from: f64, to: f64| {
+        let corner = |along: f64, y: f64| centre + aside * 3.05 + axis * along + Vector3::y() * y;
+        let net = [from, to].map(|along| [-8.0, 8.0].map(|y| corner(along, y)).to_vec()).to_vec();
+        let ends = || vec![0.0, 0.0, 1.0, 1.0];
+        Patch::Nurbs(NurbsSurface::new(1, 1, ends(), ends(), &net, None).unwrap())
+    };
+    let plane =
+        AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 20.0], [0.0, 20.0]]).unwrap();
+    let cutter = Cutter::ball(6.0).unwrap();
+    let solid = Solid::of_cutter(&cutter, None);
+    let settings = settings(Links::Retract);
+    let rule = ToolAxis::Fixed(axis);
+    let touch = |x: f64| {
+        let contact = motion::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
+        Touch::by(&rule, &cutter, contact, Vector3::x()).unwrap()
+    };
+    // Where the face ends, and where there is none, the tool is as quick as ever.
+    for (far, fed) in [(0.0, 2.0), (7.0, 8.0), (14.0, 16.0)] {
+        let mut patches = vec![Patch::Analytic(plane)];
+        patches.extend((far > 0.0).then(|| face(6.0, far)));
+        let part = Part::from_patches(patches, 0.002).unwrap();
+        let near = Obstacle::new(part.mesh(), part.bvh());
+        let checks = vec![Check { solid: &solid, obstacle: near, needed: -0.01 }];
+        let keep = Interference { checks, ..Interference::default() };
+        let block = Block::of(&part, &settings);
+        let ways = Ways::new(&part, &cutter, &settings, Speeds::of(&settings), &block, &keep, None);
+        let moves = ways.between(&touch(10.0), &touch(170.0), &Silent).unwrap();
+        let mut at = touch(10.0).at;
+        assert_eq!(moves[0].1, MoveKind::Retract);
+        let off = (moves[0].0.tip - at.tip).norm();
+        assert!((off - fed).abs() < 1e-9, "{far}: {off}");
+        for (to, kind) in &moves {
+            let from = std::mem::replace(&mut at, *to);
+            let hit = near.swept_clearance(&solid, &from, to, 0.2 - 2e-5);
+            assert!(*kind != MoveKind::Rapid || hit.is_none(), "{far}: {hit:?} {moves:?}");
+        }
     }
 }

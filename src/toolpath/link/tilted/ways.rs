@@ -9,9 +9,9 @@
 //!   every place of the tool is outside of the block while its axis points away from the middle. Where an
 //!   axis that turns evenly does not, it is turned away first.
 //!
-//! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at
-//! rapid rate. In the block stock may stand: there the tool goes at the feed, and down its axis no faster
-//! than a plunge.
+//! The way out along the axis, as soon as the cutter keeps off the part there as aloft, and what is outside of
+//! the block are run at rapid rate. Before that the tool goes at the feed, and where stock may stand in the
+//! block no faster than a plunge down its axis.
 //!
 //! The height aloft is the least at which the straight way stays clear of the part, on its outer side where
 //! there is no surface to meet.
@@ -323,8 +323,7 @@ impl<'a> Ways<'a> {
     /// Out of the block, over, and in again.
     fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Leg>> {
         let (a, b) = (self.out(from, &from.axis)?, self.out(to, &to.axis)?);
-        let out = self.off(from, &a);
-        let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
+        let legs = self.off(from, &a);
         let down = self.down(&b, to);
         if !self.is_clear(from, &legs, self.touching) || !self.is_clear(&b, &down, self.touching) {
             return None;
@@ -377,14 +376,23 @@ impl<'a> Ways<'a> {
         let (a, b) = (sphere.exit(from, &from.axis), sphere.exit(to, &to.axis));
         let over: Vec<Leg> = way(sphere, &a, &b).into_iter().map(|at| (at, MoveKind::Rapid)).collect();
         let is_outside = self.is_clear(&a, &over, &self.outside);
-        let off = [(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
+        let off = self.off(from, &a);
         (is_outside, off.into_iter().chain(over).chain(self.down(&b, to)).collect())
     }
 
-    /// The clearance off a place towards one outside on its axis, or that place if it is nearer.
-    fn off(&self, at: &ClPoint, outside: &ClPoint) -> ClPoint {
-        let way = (outside.tip - at.tip).norm().min(self.settings.clearance);
-        ClPoint { tip: at.tip + at.axis * way, axis: at.axis }
+    /// Along the axis to a place outside: by the clearance at the feed, or as far as it takes until the cutter
+    /// keeps off the part, as aloft, on the rest of the way, which is rapid.
+    fn off(&self, from: &ClPoint, outside: &ClPoint) -> Vec<Leg> {
+        let whole = (outside.tip - from.tip).norm();
+        let mut way = self.settings.clearance;
+        while way < whole {
+            let at = ClPoint { tip: from.tip + from.axis * way, axis: from.axis };
+            if self.aloft.on_move(&at, outside).is_none() {
+                return vec![(at, MoveKind::Retract), (*outside, MoveKind::Rapid)];
+            }
+            way = 2.0 * way.max(ALOFT);
+        }
+        vec![(*outside, MoveKind::Retract)]
     }
 }
 
