@@ -294,16 +294,26 @@ fn smoothed_streamlines_hold_the_target() {
     assert!(moves[1] < 0.7 * moves[0] && length[1] < 1.03 * length[0], "{moves:?} {length:?}");
 }
 
-/// A plate of 22 × 10 mm with a notch in its upper side.
-fn notched_plate() -> Vec<[Point3; 3]> {
-    let (x, y) = ([0.0, 8.0, 14.0, 22.0], [0.0, 5.1, 10.0]);
-    let cells = [[0, 0], [1, 0], [2, 0], [0, 1], [2, 1]];
+/// A plate between sides at these places, mm, with a notch in its upper side between every second pair.
+fn with_notches(x: &[f64], y: [f64; 3]) -> Vec<[Point3; 3]> {
+    let columns = 0..x.len() - 1;
+    let cells = columns.clone().map(|i| [i, 0]).chain(columns.step_by(2).map(|i| [i, 1]));
     let halves = |[i, j]: [usize; 2]| {
         let [a, b, c, d] =
             [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[k, l]| Point3::new(x[i + k], y[j + l], 0.0));
         [[a, b, c], [a, c, d]]
     };
-    cells.into_iter().flat_map(halves).collect()
+    cells.flat_map(halves).collect()
+}
+
+/// A plate of 22 × 10 mm with a notch in its upper side.
+fn notched_plate() -> Vec<[Point3; 3]> {
+    with_notches(&[0.0, 8.0, 14.0, 22.0], [0.0, 5.1, 10.0])
+}
+
+/// A comb of 18 × 10 mm with five teeth of 2 mm.
+fn comb() -> Vec<[Point3; 3]> {
+    with_notches(&[0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0], [0.0, 2.8, 10.0])
 }
 
 /// A round disk with a radius of 10 mm.
@@ -323,9 +333,13 @@ fn streamlines_are_quick_on_parts_that_are_no_rectangle() {
                  [[toolpath]]\nstrategy = \"streamline\"\n\
                  [[toolpath]]\nstrategy = \"zigzag\"\nangle = \"best\"\nlinks = \"surface\"\n";
     let mut straight = 0.0;
-    for (name, triangles) in
-        [("notched plate", notched_plate()), ("disk", disk()), ("solid disk", solid_disk())]
-    {
+    let parts = [
+        ("notched plate", notched_plate()),
+        ("comb", comb()),
+        ("disk", disk()),
+        ("solid disk", solid_disk()),
+    ];
+    for (name, triangles) in parts {
         let home = tempfile::tempdir().unwrap();
         write_stl(&home.path().join("part.stl"), &triangles);
         let file = home.path().join("scene.toml");

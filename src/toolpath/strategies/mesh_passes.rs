@@ -536,6 +536,14 @@ impl MeshGuide<'_> {
             knots[knot_of[first]].s - self.overrun(&curve.points[first], before.as_ref()),
             knots[knot_of[last + 1]].s + self.overrun(&curve.points[last + 1], after),
         ];
+        // Around a corner of the border the next side may be served from beyond it.
+        let along = |p: &MeshPoint| self.runs_along_border(p);
+        let [before, after] = [
+            curve.points[..first].iter().position(along),
+            curve.points[last + 1..].iter().rposition(along).map(|k| last + 1 + k),
+        ];
+        let start = before.map_or(start, |k| start.min(knots[knot_of[k]].s));
+        let end = after.map_or(end, |k| end.max(knots[knot_of[k]].s));
         let at = |s: f64| {
             let k = knots.partition_point(|k| k.s <= s).clamp(1, knots.len() - 1);
             let (a, b) = (&knots[k - 1], &knots[k]);
@@ -561,6 +569,16 @@ impl MeshGuide<'_> {
         let [on_border, ..] = self.surface.mesh.corners(p.triangle as usize);
         let out = p.position - on_border;
         (out - border * out.dot(border)).norm() <= 0.5 * allowed.width
+    }
+
+    /// Whether a pass at a place beyond the border serves it and runs nearly along it.
+    fn runs_along_border(&self, p: &MeshPoint) -> bool {
+        let beyond = (p.triangle as usize).checked_sub(self.surface.own_triangles);
+        let border = beyond.and_then(|t| self.surface.border.get(t));
+        border.zip(self.on.gradient(p).try_normalize(1e-300)).is_some_and(|(border, across)| {
+            let cotangent = across.cross(border).norm() / across.dot(border).abs().max(1e-9);
+            useful_overrun(cotangent).is_infinite() && self.serves(p)
+        })
     }
 
     /// How far a pass that crosses the border at `p` is worth running on, mm; `beyond` is the point
