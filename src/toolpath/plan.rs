@@ -170,7 +170,7 @@ fn plan_on(
         Ok((kept, added))
     })?;
     let of_rest = settings.places.rest.as_ref().and_then(|rest| rest.note());
-    let further = touch_up::note(added.len()).into_iter().chain(of_rest).collect();
+    let further = touch_up::note(&added).into_iter().chain(of_rest).collect();
     let all = kept.passes.iter().cloned().chain(added).collect();
     let all = deeper(all, cutter, settings);
     let path = join(by_levels(all, &setup)?, strategy.both_ways(), &setup)?;
@@ -225,19 +225,12 @@ pub fn plan_tilted(
         reason: format!("a cutter that tilts needs a surface with two sides. {e}"),
     })?;
     let setup = Setup { part, cutter, settings, monitor };
-    let (mut planned, dropped, located) = with_task(&setup, strategy, Some(tilting.axis), |task| {
+    let (mut planned, added) = with_task(&setup, strategy, Some(tilting.axis), |task| {
         let planned = strategy.passes(task)?;
-        // On a mesh the normal jumps from facet to facet; a ball that is dropped rolls over them.
-        let is_located = !planned.touches.is_empty() && !part.patches().is_empty();
-        Ok(if is_located {
-            let located = touch_up::touches(task, &planned.passes, tilting.axis)?;
-            (planned, Vec::new(), located)
-        } else {
-            let dropped = touch_up::passes(task, &planned.passes)?;
-            (planned, dropped, Vec::new())
-        })
+        let added = touch_up::passes(task, &planned.passes)?;
+        Ok((planned, added))
     })?;
-    planned.notes.extend(touch_up::note(dropped.len() + located.len()));
+    planned.notes.extend(touch_up::note(&added));
     let (passes, touches) = (mem::take(&mut planned.passes), mem::take(&mut planned.touches));
     let ball = tilted::probe(cutter).unwrap_or(*cutter);
     let tilt = |passes: &[Vec<Point3>]| {
@@ -248,9 +241,8 @@ pub fn plan_tilted(
     } else {
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
-    touches.passes.extend(located);
-    if !dropped.is_empty() {
-        touches.append(tilt(&dropped)?);
+    if !added.is_empty() {
+        touches.append(tilt(&added)?);
     }
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
     let (path, too_near_between) =

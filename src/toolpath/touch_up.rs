@@ -1,18 +1,14 @@
 //! Short passes over places where an earlier plan left too much, while all other passes stay where they are.
 //!
 //! Enters: the passes of an upright cutter, or the contacts of one that leans, and places on the design.
-//! Leaves: further passes, each beside a stretch of its nearest pass and through the places there, so that it
-//! runs along their ridge: of what is dropped in the cutter's stead, or on patches of one that leans of where
-//! it touches. What is cut once more can only sink; passes that are placed anew leave ridges at other places.
+//! Leaves: further passes of what is dropped in its stead, each beside a stretch of its nearest pass and
+//! through the places there, so that it runs along their ridge. What is cut once more can only sink; passes
+//! that are placed anew leave ridges at other places.
 
 use crate::link::plane_interval;
-use crate::moves::touch::Touch;
-use crate::tilt::tilted;
 use crate::vocabulary::{PlanError, Task};
 use drop_cutter::{Beside, DropCutter};
-use geometry::{CubicSpline, Point2, Point3, share_on};
-use motion::{CcPoint, ToolAxis};
-use nalgebra::{Point, SVector};
+use geometry::{CubicSpline, Point2, Point3, Vector2, share_on};
 use work::monitor;
 
 /// A pass serves what lies within this share of an interval beside it: on a plane, what stands there sinks to
@@ -28,11 +24,9 @@ const BEYOND: f64 = 1.0;
 /// and follows its neighbour no farther than so many to either side: what lies beyond takes another pass.
 const FARTHEST: f64 = 16.0;
 
-/// Shorter ways, mm, have no direction.
-const LEAST_WAY: f64 = 1e-12;
-
 /// What the user is told of further passes.
-pub(crate) fn note(count: usize) -> Option<String> {
+pub(crate) fn note(added: &[Vec<Point3>]) -> Option<String> {
+    let count = added.len();
     let passes = if count == 1 { "short pass goes" } else { "short passes go" };
     (count > 0).then(|| format!("{count} {passes} once more over places where others left too much"))
 }
@@ -61,7 +55,7 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
         drop.at(axis.x, axis.y).is_some_and(|drop| is_under(drop.tip_z)).then_some(axis)
     };
     let mut waiting: Vec<Point2> = places.iter().filter_map(axis_over).collect();
-    while let Some((copy, [from, to])) = next_run(planned, in_plan, &mut waiting, interval) {
+    while let Some((copy, [from, to])) = next_run(planned, &mut waiting, interval) {
         monitor::check(monitor)?;
         let mut last = Beside::default();
         let mut tip = |s: f64| {
@@ -76,37 +70,6 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
     Ok(added)
 }
 
-/// As [`passes`] of a cutter that leans by a rule and is located on patches by its contacts, which are
-/// `planned`: where it touches.
-///
-/// # Errors
-/// When cancelled, and where the rule gives no axis.
-pub(crate) fn touches(
-    task: &Task<'_>,
-    planned: &[Vec<Point3>],
-    rule: &ToolAxis,
-) -> Result<Vec<Vec<Touch>>, PlanError> {
-    let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let places = settings.earlier.map_or(&[][..], |earlier| &earlier.touch_up);
-    let interval = plane_interval(task.dropped(), settings.step);
-    let mut waiting: Vec<Point3> = places.iter().map(|place| part.closest_point(place).0.point).collect();
-    let mut added = Vec::new();
-    while let Some((copy, run)) = next_run(planned, |contact| *contact, &mut waiting, interval) {
-        monitor::check(monitor)?;
-        let contact = |s: f64| {
-            let foot = part.closest_point(&copy.at(s)).0;
-            let (way, normal) = (copy.way_at(s)?, foot.normal);
-            let feed = (way - normal * way.dot(&normal)).try_normalize(LEAST_WAY)?;
-            Some((CcPoint { point: foot.point, normal }, feed))
-        };
-        let pass = tilted::along(&contact, run, cutter, rule, settings.chord_tolerance, monitor)?;
-        if pass.len() > 1 {
-            added.push(pass);
-        }
-    }
-    Ok(added)
-}
-
 /// The passes of their own that places take whose cutter stands at the `axes`: the length of each, mm. They
 /// are found one by one, so that who has seen enough may stop.
 pub fn short_passes(
@@ -114,53 +77,40 @@ pub fn short_passes(
     mut axes: Vec<Point2>,
     interval: f64,
 ) -> impl Iterator<Item = f64> {
-    let runs = std::iter::from_fn(move || next_run(planned, in_plan, &mut axes, interval));
+    let runs = std::iter::from_fn(move || next_run(planned, &mut axes, interval));
     runs.map(|(_, [from, to])| to - from)
-}
-
-fn in_plan(place: &Point3) -> Point2 {
-    place.xy()
 }
 
 /// The pass beside which the first of the waiting places is served, and the run of it that serves those along
 /// it, mm; these wait no longer. `None` without places or passes.
-fn next_run<const D: usize>(
-    planned: &[Vec<Point3>],
-    seen: impl Fn(&Point3) -> Point<f64, D>,
-    waiting: &mut Vec<Point<f64, D>>,
-    interval: f64,
-) -> Option<(Copied<D>, [f64; 2])> {
-    let copy = Copied::beside(planned, seen, *waiting.first()?, FARTHEST * interval)?;
+fn next_run(planned: &[Vec<Point3>], waiting: &mut Vec<Point2>, interval: f64) -> Option<(Copied, [f64; 2])> {
+    let copy = Copied::beside(planned, *waiting.first()?, FARTHEST * interval)?;
     let run = copy.serve(waiting, interval);
     Some((copy, run))
 }
 
-/// A stretch of a pass, in the plan view or in space, shifted so that it runs through a place.
-struct Copied<const D: usize> {
-    corners: Vec<Point<f64, D>>,
+/// A stretch of a pass in the plan view, shifted so that it runs through a place.
+struct Copied {
+    corners: Vec<Point2>,
     /// Length up to each corner, mm.
     lengths: Vec<f64>,
 }
 
-impl<const D: usize> Copied<D> {
+impl Copied {
     /// Of the pass that is nearest to a place, up to `farthest` mm to either side of it; `None` without
     /// passes.
-    fn beside(
-        passes: &[Vec<Point3>],
-        seen: impl Fn(&Point3) -> Point<f64, D>,
-        place: Point<f64, D>,
-        farthest: f64,
-    ) -> Option<Self> {
+    fn beside(passes: &[Vec<Point3>], place: Point2, farthest: f64) -> Option<Self> {
         let stretches = passes.iter().flat_map(|pass| (1..pass.len()).map(move |k| (pass, k)));
         let near = stretches.map(|(pass, k)| {
-            let on = nearest_on(place, seen(&pass[k - 1]), seen(&pass[k])).0;
+            let (a, b) = (pass[k - 1].xy(), pass[k].xy());
+            let on = nearest_on(place, a, b).0;
             ((on - place).norm_squared(), pass, k, on)
         });
         let (_, pass, k, on) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let shift = place - on;
         let walk = |corners: &mut dyn Iterator<Item = &Point3>| {
             let (mut found, mut far, mut before) = (Vec::new(), 0.0, on);
-            for corner in corners.map(&seen) {
+            for corner in corners.map(|corner| corner.xy()) {
                 if far >= farthest {
                     break;
                 }
@@ -178,33 +128,16 @@ impl<const D: usize> Copied<D> {
         Some(Self { corners, lengths })
     }
 
-    /// The piece so many mm from the beginning, by the corner at its end, and the share of it that lies
-    /// before.
-    fn piece(&self, s: f64) -> (usize, f64) {
-        let k = self.lengths.partition_point(|length| *length <= s).clamp(1, self.corners.len() - 1);
-        let length = self.lengths[k] - self.lengths[k - 1];
-        (k, if length > 0.0 { (s - self.lengths[k - 1]) / length } else { 0.0 })
-    }
-
     /// The place so many mm from the beginning.
-    fn at(&self, s: f64) -> Point<f64, D> {
-        let (k, share) = self.piece(s);
-        self.corners[k - 1] + (self.corners[k] - self.corners[k - 1]) * share
-    }
-
-    /// The way on from there, which turns evenly from corner to corner; `None` on a stretch of no length.
-    fn way_at(&self, s: f64) -> Option<SVector<f64, D>> {
-        let (k, share) = self.piece(s);
-        let last = self.corners.len() - 1;
-        let around = |k: usize| {
-            let [before, after] = [k.saturating_sub(1), (k + 1).min(last)].map(|k| self.corners[k]);
-            (after - before).try_normalize(LEAST_WAY)
-        };
-        Some(around(k - 1)? * (1.0 - share) + around(k)? * share)
+    fn at(&self, s: f64) -> Point2 {
+        let k = self.lengths.partition_point(|length| *length <= s).clamp(1, self.corners.len() - 1);
+        let step: Vector2 = self.corners[k] - self.corners[k - 1];
+        let length = self.lengths[k] - self.lengths[k - 1];
+        self.corners[k - 1] + step * if length > 0.0 { (s - self.lengths[k - 1]) / length } else { 0.0 }
     }
 
     /// How far along the stretch and how far beside it a place lies, mm.
-    fn along_and_aside(&self, place: Point<f64, D>) -> [f64; 2] {
+    fn along_and_aside(&self, place: Point2) -> [f64; 2] {
         let of_piece = |k: usize| {
             let (on, share) = nearest_on(place, self.corners[k - 1], self.corners[k]);
             [self.lengths[k - 1] + share * (self.lengths[k] - self.lengths[k - 1]), (on - place).norm()]
@@ -215,7 +148,7 @@ impl<const D: usize> Copied<D> {
 
     /// Takes the first of the waiting places, and those that follow it along the stretch; leaves the run that
     /// serves them.
-    fn serve(&self, waiting: &mut Vec<Point<f64, D>>, interval: f64) -> [f64; 2] {
+    fn serve(&self, waiting: &mut Vec<Point2>, interval: f64) -> [f64; 2] {
         let found: Vec<[f64; 2]> = waiting.iter().map(|place| self.along_and_aside(*place)).collect();
         let mut beside: Vec<f64> = found.iter().filter(|f| f[1] <= SERVED * interval).map(|f| f[0]).collect();
         beside.sort_by(f64::total_cmp);
@@ -236,11 +169,7 @@ impl<const D: usize> Copied<D> {
 }
 
 /// The place of a straight piece nearest to another, and its share of the way.
-fn nearest_on<const D: usize>(
-    place: Point<f64, D>,
-    a: Point<f64, D>,
-    b: Point<f64, D>,
-) -> (Point<f64, D>, f64) {
+fn nearest_on(place: Point2, a: Point2, b: Point2) -> (Point2, f64) {
     let share = share_on(&place, &a, &b);
     (a + (b - a) * share, share)
 }
@@ -251,11 +180,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        Along, Correction, Earlier, FrontStart, IsoParametric, IsoScallop, Plan, PlanSettings, Step,
-        Strategy, Tilting, Zigzag, plan_tilted,
+        Along, Correction, Earlier, FrontStart, IsoScallop, Plan, PlanSettings, Step, Strategy, Tilting,
+        Zigzag, plan_tilted,
     };
     use cutter::Cutter;
-    use geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, Vector3};
+    use geometry::{AnalyticShape, AnalyticSurface};
     use motion::{MoveKind, ToolAxis};
     use part::{Part, Patch};
     use work::monitor::Silent;
@@ -265,7 +194,7 @@ mod tests {
         // Passes along x, 1 mm apart.
         let line = |y: f64| (0..=100).map(|k| Point3::new(f64::from(k), y, 0.0)).collect::<Vec<_>>();
         let passes = [line(0.0), line(1.0), line(2.0)];
-        let copy = Copied::beside(&passes, in_plan, Point2::new(50.0, 0.45), 16.0).unwrap();
+        let copy = Copied::beside(&passes, Point2::new(50.0, 0.45), 16.0).unwrap();
         let mut waiting = vec![
             Point2::new(50.0, 0.45),
             Point2::new(51.5, 0.5),
@@ -289,10 +218,10 @@ mod tests {
         );
         assert_eq!(short_passes(&[], axes.to_vec(), 1.0).count(), 0);
         // Beside the end of a pass there is no more of it.
-        let copy = Copied::beside(&passes, in_plan, Point2::new(99.5, 0.45), 16.0).unwrap();
+        let copy = Copied::beside(&passes, Point2::new(99.5, 0.45), 16.0).unwrap();
         let run = copy.serve(&mut vec![Point2::new(99.5, 0.45)], 1.0);
         assert!((copy.at(run[1]) - Point2::new(100.0, 0.45)).norm() < 1e-12);
-        assert!(Copied::beside(&[], in_plan, Point2::origin(), 1.0).is_none());
+        assert!(Copied::beside(&[], Point2::origin(), 1.0).is_none());
     }
 
     /// Whether passes are tilted around a ball that was dropped (zigzag) or located by their contacts (the
@@ -334,45 +263,6 @@ mod tests {
             assert!(beside(&before) > 0.2, "{}", beside(&before));
             assert!(beside(&after) < 1e-6, "{}", beside(&after));
             assert!(after.notes.iter().any(|note| note.starts_with("1 short pass ")), "{:?}", after.notes);
-        }
-    }
-
-    /// A sheet that leans out by 5 degrees as it rises: a ball that came down there would touch its back, from
-    /// which the tool would cut through it.
-    #[test]
-    fn a_place_on_an_overhanging_sheet_gets_a_pass_on_its_front() {
-        let lean = 5f64.to_radians().tan();
-        let net = [20.0, 0.0].map(|x| [0.0, 12.0].map(|z| Point3::new(x, lean * z, z)).to_vec()).to_vec();
-        let ends = || vec![0.0, 0.0, 1.0, 1.0];
-        let sheet = NurbsSurface::new(1, 1, ends(), ends(), &net, None).unwrap();
-        let part = Part::from_oriented_patches(vec![Patch::Nurbs(sheet)], 0.002).unwrap();
-        let cutter = Cutter::ball(6.0).unwrap();
-        let rule = ToolAxis::LeadTilt { lead: 15f64.to_radians(), tilt: 0.0 };
-        let tilting =
-            Tilting { axis: &rule, most_turning: None, most_turning_across: None, interference: None };
-        for (along, z) in [Along::U, Along::V].into_iter().flat_map(|along| [(along, 11.6), (along, 11.0)]) {
-            let place = Point3::new(10.3, lean * z, z);
-            assert!(part.closest_point(&(place + Vector3::y())).1 > 0.0);
-            let earlier = Earlier { touch_up: vec![place], ..Earlier::default() };
-            let settings = PlanSettings {
-                step: Step::Scallop(0.05),
-                earlier: Some(Arc::new(earlier)),
-                ..PlanSettings::default()
-            };
-            let strategy = IsoParametric::along(along);
-            let plan = plan_tilted(&part, &cutter, &strategy, &tilting, &settings, &Silent).unwrap();
-            let cuts = plan.path.moves.windows(2).filter(|ends| ends[1].kind == MoveKind::Cut);
-            let centres = cuts.map(|ends| [0, 1].map(|k: usize| ends[k].to.tip + ends[k].to.axis * 3.0));
-            let centres: Vec<[Point3; 2]> = centres.collect();
-            let off = centres.iter().flatten().map(|centre| part.closest_point(centre).1);
-            let lowest = off.fold(f64::INFINITY, f64::min);
-            assert!((lowest - 3.0).abs() < 0.01, "{along:?} {z}: {lowest} {:?}", plan.notes);
-            // It leads the ball over the place.
-            let over = place + part.closest_point(&place).0.normal * 3.0;
-            let far = centres.iter().map(|[a, b]| geometry::distance_to_segment(&over, a, b));
-            let far = far.fold(9.0, f64::min);
-            assert!(far < 0.01, "{along:?} {z}: {far} {:?}", plan.notes);
-            assert!(plan.notes.iter().any(|note| note.starts_with("1 short pass goes once more")));
         }
     }
 }
