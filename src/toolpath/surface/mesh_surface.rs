@@ -28,9 +28,10 @@ const FIT_OVER_RADIUS: f64 = 0.5;
 /// deviation lies between two tessellations of the same curve; models leave gaps as well.
 const WELD_OVER_DEVIATION: f64 = 4.0;
 
-/// Steeper places than this, from the level, are left out, as the cosine
-/// (80°): passes along the surface would lie nearly on top of each other in the plan view.
-pub(crate) const STEEPEST_COSINE: f64 = 0.173_648;
+/// Steeper places than this, from the level, are left out, as the cosine: passes along the surface would lie
+/// nearly on top of each other in the plan view. A tenth of a degree beyond 80, so that walls drafted by 10, as
+/// their file rounds them, are in.
+pub(crate) const STEEPEST_COSINE: f64 = 0.171_929;
 
 /// A mesh fills the rectangle around it where no more than this share of it lies beside: coordinates are rounded.
 const BESIDE: f64 = 1e-6;
@@ -478,4 +479,44 @@ impl MeshSurface {
 
 pub(crate) fn not_applicable(reason: &str) -> PlanError {
     PlanError::NotApplicable { strategy: "streamline", reason: reason.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::TriangleMesh;
+
+    /// A block with walls drafted by 10 degrees on all sides, its coordinates rounded as a binary STL does.
+    #[test]
+    fn walls_drafted_by_ten_degrees_are_reached() {
+        let out = 5.0 * 10f64.to_radians().tan();
+        let ring = |half: f64, z: f64| {
+            [[-1.0, -0.7], [1.0, -0.7], [1.0, 0.7], [-1.0, 0.7]].map(|[x, y]| {
+                // Askew, so that no two walls round alike.
+                let (sin, cos) = 0.3f64.sin_cos();
+                let [x, y] = [half * x, half * y];
+                let far = [cos * x - sin * y + 700.0, sin * x + cos * y + 400.0, z];
+                Point3::from(far.map(|c| f64::from(c as f32)))
+            })
+        };
+        let points = ring(10.0, 5.0);
+        let foot: Vec<Point3> = (0..4)
+            .map(|k| {
+                let [before, here, after] = [3, 0, 1].map(|n| points[(k + n) % 4].xy());
+                let square = |way: geometry::Vector2| geometry::Vector2::new(way.y, -way.x) * out;
+                let aside = square((here - before).normalize()) + square((after - here).normalize());
+                let foot = (here + aside).coords.push(0.0);
+                Point3::from(foot.map(|c| f64::from(c as f32)))
+            })
+            .collect();
+        let points = [foot, points.to_vec()].concat();
+        let wall = |k: u32| [[k, (k + 1) % 4, 4 + (k + 1) % 4], [k, 4 + (k + 1) % 4, 4 + k]];
+        let triangles = (0..4).flat_map(wall).chain([[4, 5, 6], [4, 6, 7]]).collect();
+        let part = Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0);
+        let walls = (0..8).map(|t| part.mesh().normal(t).z - 80f64.to_radians().cos());
+        let off: Vec<f64> = walls.collect();
+        assert!(off.iter().all(|off| off.abs() < 1e-4) && off.iter().any(|off| *off < -2e-7), "{off:?}");
+        let reached = reachable(&part, &Cutter::ball(6.0).unwrap(), 0.7).unwrap();
+        assert!(reached.steep_area == 0.0, "{}", reached.steep_area);
+    }
 }
