@@ -69,7 +69,7 @@ const MEASURED_SLACK: f64 = 0.2;
 /// quarter by [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other
 /// widths do not cut it either. They cut no less deep either where a plan cuts deeper by as many times than
 /// it may.
-pub(crate) const NEVER_CUT: f64 = 16.0;
+const NEVER_CUT: f64 = 16.0;
 
 /// A plan that leaves no more than so many times what every path leaves is not made better.
 const NEAR_LEAST: f64 = 2.0;

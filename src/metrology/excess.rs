@@ -219,10 +219,8 @@ impl ExcessSearch<'_> {
                         }
                         let enough = here + if is_reached { slack } else { NUMERICAL_FLOOR };
                         // Where no pass came down to the design, all around is as high.
-                        if rises && !is_reached && half <= small {
-                            continue;
-                        }
-                        (possible, possible > known.max(enough))
+                        let is_uncut = rises && !is_reached && half <= small;
+                        (possible, possible > known.max(enough) && !is_uncut)
                     }
                 };
                 if is_open && half > smallest {

@@ -41,7 +41,6 @@ mod facing;
 mod figures;
 #[cfg(test)]
 mod flat_scene;
-mod hollow;
 mod inspected;
 mod inspection;
 mod measure;

@@ -4,8 +4,7 @@
 use super::coverage::STEEP;
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
-use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
-use super::hollow::fits;
+use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
 use super::meetings::Meetings;
 use super::ridges::{Highest, RidgeFinder, scallop_figures};
@@ -185,25 +184,16 @@ fn as_left(tops: &mut [Top], inspection: &Inspection<'_>, all: &[u32]) -> bool {
 }
 
 /// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut
-/// tolerance, or in a hollow that no cutter fits, is no remnant of a pass.
+/// tolerance is no remnant of a pass.
 pub(super) fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
-    let Inspection { part, cutters, grid, limits, .. } = *inspection;
-    let is_fitted = |at: &Point3| {
-        let design = part.closest_point(at).0;
-        cutters.each().any(|(_, cutter)| fits(part, cutter, &design.point, &design.normal, limits.scallop))
-    };
-    let is_remnant = |place: &RidgePlace| {
-        place.height > 0.0
-            && place.height <= limits.uncut
-            && (place.height <= NEAR_LIMIT * limits.scallop || is_fitted(&place.at))
-    };
+    let Inspection { grid, limits, .. } = *inspection;
     let of_row = |j: usize| {
         let cells = (0..grid.nx).filter(|&i| on_part(&grid, samples, i, j));
         let sides = cells.flat_map(|i| ending_sides(&grid, samples, i, j).map(move |side| (i, side)));
         sides.filter_map(|(i, side)| inspection.at_side(grid.centre(i, j), side)).collect::<Vec<_>>()
     };
     let rows = work::parallel::map(grid.ny, of_row);
-    rows.into_iter().flatten().filter(is_remnant).collect()
+    rows.into_iter().flatten().filter(|p| p.height > 0.0 && p.height <= limits.uncut).collect()
 }
 
 /// Whether a cell's centre lies over the part.

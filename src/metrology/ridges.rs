@@ -16,7 +16,6 @@
 use super::cut_surface::CutSurface;
 use super::every_move::EveryMove;
 use super::figures::{Limits, Measurement, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
-use super::hollow::fits;
 use super::inspection::Inspection;
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
@@ -273,11 +272,6 @@ impl<'a> RidgeFinder<'a> {
         if height > NEAR_LIMIT * self.limits.scallop && self.is_cut_away(&at) {
             return None;
         }
-        // What passes leave in a hollow is told with the highest material.
-        let is_in_hollow = || !moves.iter().any(|&by| self.fits(by, &foot));
-        if height > NEAR_LIMIT * self.limits.scallop && height <= self.limits.uncut && is_in_hollow() {
-            return None;
-        }
         if height > self.limits.uncut && self.leans_over(&foot.point, &at) {
             return None;
         }
@@ -418,11 +412,6 @@ impl RidgeFinder<'_> {
         (0..3)
             .filter(|&k| mesh.neighbour(foot.triangle as usize, k).is_none())
             .any(|k| distance_to_segment(&foot.point, &corners[k], &corners[(k + 1) % 3]) <= NUMERICAL_FLOOR)
-    }
-
-    /// Whether the cutter of a move fits the place below a ridge.
-    fn fits(&self, by: u32, foot: &SurfacePoint) -> bool {
-        fits(self.part, self.cutters.of_move(by), &foot.point, &foot.normal, self.limits.scallop)
     }
 
     /// True when a high ridge over `foot` stands between passes that came down to the design on its

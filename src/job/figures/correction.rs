@@ -5,7 +5,7 @@ use work::monitor::Monitor;
 
 use super::words::value;
 use crate::JobError;
-use crate::correction::{CorrectionRound, NEVER_CUT};
+use crate::correction::CorrectionRound;
 use crate::run::{Finding, Run};
 
 /// What the word means.
@@ -54,14 +54,5 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         table: several.then_some(table),
         ..Figure::default()
     };
-    let kept = correction.rounds.get(correction.kept - 1);
-    let given_up = kept.filter(|kept| kept.highest() > NEVER_CUT * correction.target_mm);
-    let note = given_up.map(|kept| {
-        format!(
-            "the plan is not corrected further: it leaves {} µm, more than {NEVER_CUT:.0} times the target. What stands so high \
-             was never cut, and passes nearer to each other do not cut it",
-            highest(kept)
-        )
-    });
-    Ok(Finding { figure: Some(figure), notes: note.into_iter().collect(), ..Finding::default() })
+    Ok(Finding { figure: Some(figure), ..Finding::default() })
 }

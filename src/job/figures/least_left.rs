@@ -6,7 +6,7 @@ use serde::Serialize;
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use geometry::{Point3, Vector3};
-use metrology::{Bounded, ExcessKind, Measurement};
+use metrology::{Bounded, Measurement};
 use motion::{ROUNDING, Toolpath};
 use part::Part;
 use report::{Figure, micrometres, place, with_bound};
@@ -326,7 +326,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let unseen = run.covered.unseen.iter().flat_map(|unseen| Violated::unseen(run.session, unseen));
     let violated = unseen.chain(Violated::of(run.session, run.measurement())).collect();
     let left = LeastLeftFigures::above_limit(run.session, with, &run.whole.path, violated, monitor)?;
-    let Some(left) = left else { return Ok(Finding { notes: in_hollow(run), ..Finding::default() }) };
+    let Some(left) = left else { return Ok(Finding::default()) };
     let (height, bound) = (left.height_mm, left.error_bound_mm);
     let height = if bound <= CLOSE * height {
         format!("{} µm", with_bound(Some(height), Some(bound)))
@@ -346,23 +346,6 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     );
     let figure = Figure { key: "least_left", value: value(&left)?, ..Figure::default() };
     Ok(Finding { figure: Some(figure), notes: vec![note], ..Finding::default() })
-}
-
-/// What stands higher than ridges may where the cutter does not fit, within the limit of uncut material.
-fn in_hollow(run: &Run<'_>) -> Vec<String> {
-    let excess = run.measurement().excess;
-    let (uncut, unreached) = (run.session.scene.tolerance.uncut, excess.unreached);
-    let stands = excess.kind == ExcessKind::Uncut && unreached.max_mm > ridge_limit(run.session);
-    let at = unreached.at_mm.filter(|_| stands && unreached.at_most() <= uncut);
-    let note = |at| {
-        format!(
-            "in a hollow that the cutter does not fit {} µm stand at {}: that is uncut material (limit {})",
-            with_bound(Some(unreached.max_mm), Some(unreached.error_bound_mm)),
-            place(at),
-            micrometres(Some(uncut))
-        )
-    };
-    at.map(note).into_iter().collect()
 }
 
 #[cfg(test)]
@@ -396,29 +379,6 @@ mod tests {
         let rounds = value(&bull, "correction").unwrap()["rounds"].as_array().unwrap().len();
         assert!(rounds <= 6, "{rounds} rounds");
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
-    }
-
-    /// What a ball leaves in a trough that it does not fit is uncut material, wherever passes run and whatever
-    /// measures it: more than a scallop may be, and told, but within its own limit.
-    #[test]
-    fn what_stands_in_a_hollow_answers_to_one_limit() {
-        let zigzag = "\"zigzag\"\nangle = 90";
-        for (engine, strategy) in [("zmap", zigzag), ("rays", zigzag), ("zmap", "\"streamline\"")] {
-            let text = format!(
-                "[part]\nsurface = \"wave\"\namplitude = 4\nwavelength_x = 20\nwavelength_y = 1000\nx = [0, 20]\n\
-                 y = [0, 10]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.02\n\
-                 [simulation]\nengine = \"{engine}\"\n[[toolpath]]\nstrategy = {strategy}\n"
-            );
-            let session = Session::new(Scene::parse("trough.toml", text).unwrap()).unwrap();
-            let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
-            let (kind, highest) = (result.excess.kind, result.excess.highest);
-            assert_eq!(result.verdict, report::Verdict::Pass, "{engine} {strategy}: {:?}", result.claims);
-            assert!(
-                kind == ExcessKind::Uncut && highest.max_mm > 0.03,
-                "{engine} {strategy}: {kind:?} {highest:?}"
-            );
-            assert!(result.notes.iter().any(|note| note.contains("in a hollow")), "{:?}", result.notes);
-        }
     }
 
     /// Behind another toolpath with a cutter of its own what stands for certain, and what its own cutter leaves

@@ -8,7 +8,7 @@ use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
 use super::{GRAZING, NormalInspection, Sample, Way};
-use crate::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR};
+use crate::figures::{Limits, NUMERICAL_FLOOR};
 use geometry::{Point3, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -193,35 +193,21 @@ pub(super) struct Greatest {
     pub uncut: Option<(f64, Sample)>,
     /// The highest ridge, where it is, and how much lower it may be.
     pub ridge: Option<(f64, Point3, f64)>,
-    /// The highest place up to the uncut tolerance where the cutter fits, with its height, mm.
+    /// The highest place up to the uncut tolerance, with its height, mm.
     pub place: Option<(f64, Sample)>,
-    /// The same where it does not fit.
-    pub hollow: Option<(f64, Point3)>,
 }
 
 impl Greatest {
-    pub fn look_at(&mut self, sample: &Sample, inspection: &NormalInspection<'_>) {
+    pub fn look_at(&mut self, sample: &Sample, limits: &Limits) {
         let Some(hit) = sample.hit else { return };
         let rounding = GRAZING * sample.slope();
-        let height = hit.deviation - rounding;
-        if hit.deviation <= inspection.limits.uncut && height > self.highest_place() {
-            if inspection.is_remnant(sample) {
-                self.place = Some((height, *sample));
-            } else {
-                self.look_at_hollow(height, sample.place.point);
-            }
+        if hit.deviation <= limits.uncut && hit.deviation - rounding > self.highest_place() {
+            self.place = Some((hit.deviation - rounding, *sample));
         }
         self.depth_at_least = self.depth_at_least.max(-hit.deviation - rounding - NUMERICAL_FLOOR);
         self.possible_depth = self.possible_depth.max(hit.uncertain - hit.deviation);
         if -hit.deviation > self.depth {
             (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
-        }
-    }
-
-    /// What stands so high, mm, in a hollow that the cutter does not fit.
-    pub fn look_at_hollow(&mut self, height: f64, at: Point3) {
-        if self.hollow.is_none_or(|(highest, _)| height > highest) {
-            self.hollow = Some((height, at));
         }
     }
 
@@ -348,8 +334,7 @@ impl NormalInspection<'_> {
         if found.depth > greatest.depth + far {
             found.depth = found.depth.min(self.depth_by_distance(samples));
         }
-        found.border =
-            self.border_at_most(samples, on_border, crossings).max(self.beside_hollow(samples, far));
+        found.border = self.border_at_most(samples, on_border, crossings);
         let ridge = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
         found.ridge = crossings.iter().map(ridge).fold(found.ridge, f64::max);
         found
@@ -374,8 +359,8 @@ impl NormalInspection<'_> {
     fn border_at_most(&self, samples: &[Sample; 3], on_border: [bool; 3], crossings: &[Crossing]) -> f64 {
         let of_side = |k: usize| {
             let (i, j) = (k, (k + 1) % 3);
-            let hit = |k: usize| samples[k].hit.filter(|_| self.is_remnant(&samples[k]));
-            // What rises to uncut material or into a hollow belongs to that.
+            let hit = |k: usize| samples[k].hit.filter(|hit| hit.deviation <= self.limits.uncut);
+            // What rises to uncut material belongs to that.
             let (Some(a), Some(b)) = (hit(i), hit(j)) else { return f64::NEG_INFINITY };
             let ridges = crossings.iter().filter(|c| c.moves == [a.by, b.by] || c.moves == [b.by, a.by]);
             let ridge = ridges.map(|c| c.height).fold(f64::NEG_INFINITY, f64::max);
@@ -387,19 +372,6 @@ impl NormalInspection<'_> {
             (highest + samples[i].slope().max(samples[j].slope()) * half).min(self.limits.uncut.max(highest))
         };
         (0..3).filter(|&k| on_border[k]).map(of_side).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// How high material stands at most where a hollow that the cutter does not fit ends in a triangle, of
-    /// which no place is farther than `far` from a corner, mm.
-    fn beside_hollow(&self, samples: &[Sample; 3], far: f64) -> f64 {
-        let hits = || samples.iter().filter_map(|sample| Some((sample, sample.hit?.deviation)));
-        let is_low = hits().all(|(_, height)| height <= NEAR_LIMIT * self.limits.scallop);
-        let in_hollow = || hits().filter(|(s, height)| *height <= self.limits.uncut && !self.is_remnant(s));
-        if is_low || !matches!(in_hollow().count(), 1 | 2) {
-            return f64::NEG_INFINITY;
-        }
-        let highest = hits().map(|(sample, height)| height + sample.slope() * far).fold(0.0, f64::max);
-        highest.min(self.limits.uncut)
     }
 
     /// How deep a move may cut near the corners of a triangle that it cut, by how steep it is there: no place
@@ -474,7 +446,7 @@ impl NormalInspection<'_> {
                     {
                         crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
                         for sample in &middles {
-                            greatest.look_at(sample, self);
+                            greatest.look_at(sample, self.limits);
                             greatest.look_at_height(sample, self);
                         }
                         let possible = self.possible(&samples, on_border, &crossings, greatest);

@@ -326,11 +326,8 @@ impl Along<'_> {
         let mut greatest = Greatest::default();
         let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
         of_triangle.items.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
-        if let Some(crossing) = hollow {
-            greatest.look_at_hollow(crossing.height, crossing.at);
-        }
         for sample in contacts.iter().chain(judged()) {
-            greatest.look_at(sample, &inspection);
+            greatest.look_at(sample, limits);
             greatest.look_at_height(sample, &inspection);
         }
         let pairs =
@@ -367,7 +364,7 @@ impl Along<'_> {
             format!("between the places on the normals {most:.1} µm more may stand or lie than was found; a smaller cell helps")
         });
         let scallop = scallop_figures(&ridge_samples, highest, limits);
-        let mut excess = excess_figures(&greatest, &scallop, &uncut, left.border);
+        let mut excess = excess_figures(greatest.place, &scallop, &uncut, left.border);
         let of_uncut =
             greatest.uncut.filter(|(_, sample)| inspection.is_uncut(sample, greatest.highest_ridge()));
         excess.unreached.at_least_mm = of_uncut.map_or(0.0, |(height, sample)| certain(height, &sample));
@@ -385,11 +382,9 @@ impl Along<'_> {
         let above = |height: f64| height > limits.scallop && height <= limits.uncut;
         let ridges = of_triangle.items.iter().filter(|c| above(c.height));
         let ridges = ridges.map(|c| RidgePlace { at: c.at, height: c.height });
-        let places = judged().filter_map(|sample| {
-            let height = sample.hit?.deviation;
-            (above(height) && inspection.is_remnant(sample))
-                .then_some(RidgePlace { at: sample.place.point, height })
-        });
+        let places = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
+        let places =
+            places.filter(|(height, _)| above(*height)).map(|(height, at)| RidgePlace { at, height });
         let above = ridges.chain(places).collect();
         let measured = Measurement {
             above,
@@ -488,7 +483,7 @@ impl NormalInspection<'_> {
 /// came down to the design, and of what is uncut. `left` is how much more than that place may stand along the
 /// border, mm.
 fn excess_figures(
-    greatest: &Greatest,
+    highest: Option<(f64, Sample)>,
     scallop: &ScallopFigures,
     uncut: &UncutFigures,
     left: f64,
@@ -497,15 +492,14 @@ fn excess_figures(
         at_mm: scallop.max_at_mm,
         ..Bounded::new(scallop.max_mm.unwrap_or(0.0), scallop.error_bound_mm.unwrap_or(0.0))
     };
-    let place = greatest.place.map_or_else(Bounded::default, |(height, sample)| Bounded {
+    let place = highest.map_or_else(Bounded::default, |(height, sample)| Bounded {
         at_mm: Some(sample.place.point.into()),
         at_least_mm: certain(height, &sample),
         ..Bounded::new(height, 0.0)
     });
     let place = Bounded { error_bound_mm: left + NUMERICAL_FLOOR, ..place };
-    let in_hollow = greatest.hollow.map(|(_, at)| at.into());
     let unreached = Bounded {
-        at_mm: uncut.regions.first().map(|region| region.at_mm).or(in_hollow),
+        at_mm: uncut.regions.first().map(|region| region.at_mm),
         ..Bounded::new(uncut.max_height_mm, uncut.error_bound_mm)
     };
     let reached = ridge.or(&place);

@@ -5,8 +5,6 @@
 
 use super::ridges::Crossing;
 use super::{NormalInspection, Sample};
-use crate::figures::NEAR_LIMIT;
-use crate::hollow::fits;
 use geometry::{Point3, Vector3};
 
 /// A pass serves a ridge when it touches the design within this many distances of the two contacts. On a
@@ -17,16 +15,13 @@ const FARTHEST_CONTACT: f64 = 2.0;
 const RIDGE_IS_TOP: f64 = 1e-3;
 
 impl NormalInspection<'_> {
-    /// True for a ridge within the uncut tolerance where the cutter fits, and for a higher one between passes
-    /// that came down to the design.
+    /// True for a ridge within the uncut tolerance, and for a higher one between passes that came down to the
+    /// design.
     pub fn is_scallop(&self, crossing: &Crossing) -> bool {
-        if crossing.height <= NEAR_LIMIT * self.limits.scallop {
+        if crossing.height <= self.limits.uncut {
             return true;
         }
         let (foot, _) = self.part.closest_point(&crossing.at);
-        if crossing.height <= self.limits.uncut {
-            return crossing.moves.iter().any(|&by| self.fits(by, &foot.point, &foot.normal));
-        }
         let contacts = crossing.moves.map(|by| self.nearest_contact(by, &foot.point, &foot.normal));
         let far = FARTHEST_CONTACT * (contacts[0] - contacts[1]).norm();
         let serves = |contact: &Point3| (contact - foot.point).norm() <= far && self.is_on_design(contact);
@@ -39,22 +34,6 @@ impl NormalInspection<'_> {
         let Some(hit) = sample.hit else { return true };
         hit.deviation > self.limits.uncut
             && !(hit.deviation <= highest_ridge * (1.0 + RIDGE_IS_TOP) && self.reached(sample))
-    }
-
-    /// True for a place within the uncut tolerance where the cutter fits.
-    pub fn is_remnant(&self, sample: &Sample) -> bool {
-        let place = &sample.place;
-        sample.hit.is_some_and(|hit| {
-            hit.deviation <= NEAR_LIMIT * self.limits.scallop
-                || hit.deviation <= self.limits.uncut && self.fits(hit.by, &place.point, &place.normal)
-        })
-    }
-
-    /// Whether the cutter of a move fits a place. Of cutters that lean and are no balls that is not known.
-    fn fits(&self, by: u32, place: &Point3, normal: &Vector3) -> bool {
-        let cutter = self.cutters.of_move(by);
-        let leans = self.path.moves[by as usize].to.axis != Vector3::z();
-        leans && !cutter.is_ball() || fits(self.part, cutter, place, normal, self.limits.scallop)
     }
 
     /// True where the pass that cut came down to the design.

@@ -80,7 +80,7 @@ impl NormalInspection<'_> {
                 at_mm: samples[highest as usize].place.point.into(),
             });
         }
-        let seen = figures.regions.iter().map(|r| r.height_mm).fold(self.limits.uncut, f64::max);
+        let seen = figures.regions.iter().map(|r| r.height_mm).fold(0.0, f64::max);
         // A hollow between places that are lower, all of them.
         if let Some(c) = hollow.filter(|c| c.height > seen) {
             let (area_mm2, volume_mm3) = (0.0, 0.0);
@@ -107,11 +107,6 @@ impl NormalInspection<'_> {
                 figures.error_bound_mm += more;
             }
             figures.error_bound_mm += sample.hit.map_or(0.0, |hit| hit.uncertain);
-        }
-        // Below its limit more is not looked for.
-        if let Some((height, _)) = greatest.hollow.filter(|(height, _)| *height > figures.max_height_mm) {
-            figures.max_height_mm = height;
-            figures.error_bound_mm += (self.limits.uncut - height - 2.0 * NUMERICAL_FLOOR).max(0.0);
         }
         figures
     }

@@ -2,7 +2,7 @@
 
 use super::closer::Greatest;
 use super::ridges::NEARLY;
-use super::{Along, Crossing, Grouped, Net, Seen};
+use super::{Along, Grouped, Net, Seen};
 use crate::figures::RidgePlace;
 use crate::ridge_map::RidgeMap;
 use crate::ridges::{Highest, scallop_figures};
@@ -21,13 +21,8 @@ impl Along<'_> {
         inspection.finder.close = NEARLY;
         let Seen { samples, triangles, of_triangle, on_border } =
             inspection.look(net, &vec![true; net.places.len()], monitor)?;
-        // Those that are too tall for scallops count as well: plans are corrected by them. In hollows that the
-        // cutter does not fit no plan does better.
-        let counts = |c: &Crossing| c.height > limits.uncut || inspection.is_scallop(c);
-        let of_triangle = Grouped::of(of_triangle.into_iter().map(|mut crossings| {
-            crossings.retain(counts);
-            crossings
-        }));
+        // Those that are too tall for scallops count as well: plans are corrected by them.
+        let of_triangle = Grouped::of(of_triangle);
         let mut greatest = Greatest::default();
         of_triangle.items.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
         let mut above: Vec<RidgePlace> =
@@ -35,9 +30,9 @@ impl Along<'_> {
         for (t, sides) in triangles.iter().zip(&on_border) {
             for k in (0..3).filter(|&k| sides[k]) {
                 let sample = &samples[t[k] as usize];
-                greatest.look_at(sample, &inspection);
-                let hit = sample.hit.filter(|_| inspection.is_remnant(sample));
-                above.extend(hit.map(|hit| RidgePlace { at: sample.place.point, height: hit.deviation }));
+                greatest.look_at(sample, limits);
+                let height = sample.hit.map_or(0.0, |hit| hit.deviation);
+                above.push(RidgePlace { at: sample.place.point, height });
             }
         }
         above.retain(|place| place.height > limits.scallop && place.height <= limits.uncut);

@@ -6,8 +6,8 @@ use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
-use crate::hollow::fits;
 use crate::inspection::Inspection;
+use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
 use motion::ROUNDING;
 use part::SurfacePoint;
@@ -166,7 +166,7 @@ impl Patches<'_> {
         by != NOT_CUT && {
             let cutter = cutters.of_move(by);
             let from_contact = cutter.contact_to_tip(&design.normal);
-            if !fits(part, cutter, &design.point, &design.normal, limits.scallop) {
+            if !self.fits(cutter, &(design.point + from_contact)) {
                 return false;
             }
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
@@ -179,6 +179,20 @@ impl Patches<'_> {
                 || off <= most
                 || beyond(&nearest.point, &nearest.normal) && beyond(&design.point, &design.normal)
         }
+    }
+
+    /// Whether a cutter with its tip there keeps out of the part, as far as some places around its axis tell.
+    fn fits(&self, cutter: &Cutter, tip: &Point3) -> bool {
+        const RINGS: [f64; 4] = [0.25, 0.5, 0.75, 0.97];
+        const AROUND: u32 = 12;
+        let Inspection { part, limits, .. } = *self.inspection;
+        let clear = |radius: f64, angle: f64| {
+            let q = tip.xy() + Vector2::new(angle.cos(), angle.sin()) * radius;
+            let least = tip.z + cutter.profile().height(radius) + limits.scallop.min(limits.gouge);
+            part.highest_at(q.x, q.y).is_none_or(|design| design.point.z <= least)
+        };
+        let turn = std::f64::consts::TAU / f64::from(AROUND);
+        RINGS.iter().all(|share| (0..AROUND).all(|k| clear(share * cutter.radius(), turn * f64::from(k))))
     }
 
     /// Triangles that face up and whose boxes meet the square; `None` if there are too many.
