@@ -325,6 +325,15 @@ fn disk() -> Vec<[Point3; 3]> {
     (0..90).map(|k| [Point3::origin(), at(k), at(k + 1)]).collect()
 }
 
+/// Runs a scene whose part is `part.stl`, these triangles.
+fn run_on(triangles: &[[Point3; 3]], scene: &str) -> (i32, serde_json::Value) {
+    let home = tempfile::tempdir().unwrap();
+    write_stl(&home.path().join("part.stl"), triangles);
+    let file = home.path().join("scene.toml");
+    std::fs::write(&file, scene).unwrap();
+    run_scene(&file)
+}
+
 /// Passes are planned for the part and not for the rectangle around it, nor for the walls that go down from its rim:
 /// all of it is cut, in no more time (within 2 %) than by straight passes at their best angle over the top alone.
 #[test]
@@ -335,11 +344,7 @@ fn streamlines_are_quick_on_parts_that_are_no_rectangle() {
     let mut straight = 0.0;
     let parts = [("notched plate", notched_plate()), ("disk", disk()), ("solid disk", solid_disk())];
     for (name, triangles) in parts {
-        let home = tempfile::tempdir().unwrap();
-        write_stl(&home.path().join("part.stl"), &triangles);
-        let file = home.path().join("scene.toml");
-        std::fs::write(&file, scene).unwrap();
-        let (code, report) = run_scene(&file);
+        let (code, report) = run_on(&triangles, scene);
         assert_eq!(code, 0, "{name}");
         let time = |k: usize| number(&report, &format!("/toolpaths/{k}/path/machining_time_s"));
         // The walls of a solid are of no matter, to straight passes either.
@@ -356,13 +361,9 @@ fn streamlines_are_quick_on_parts_that_are_no_rectangle() {
 /// band stands there in the plan as it is first made.
 #[test]
 fn a_pass_around_a_corner_serves_the_side_behind_it() {
-    let home = tempfile::tempdir().unwrap();
-    write_stl(&home.path().join("part.stl"), &comb());
     let scene = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[tolerance]\nscallop = 0.02\n\
                  correct = false\n[[toolpath]]\nstrategy = \"streamline\"\n";
-    let file = home.path().join("scene.toml");
-    std::fs::write(&file, scene).unwrap();
-    let (_, report) = run_scene(&file);
+    let (_, report) = run_on(&comb(), scene);
     let highest = number(&report, "/toolpaths/0/excess/max_mm");
     assert!(highest < 0.024, "{highest}");
 }
@@ -402,11 +403,7 @@ fn fronts_are_cut_on_the_part_alone() {
         ("plates", two_plates()),
     ];
     for (name, triangles) in parts {
-        let home = tempfile::tempdir().unwrap();
-        write_stl(&home.path().join("part.stl"), &triangles);
-        let file = home.path().join("scene.toml");
-        std::fs::write(&file, scene).unwrap();
-        let (code, report) = run_scene(&file);
+        let (code, report) = run_on(&triangles, scene);
         assert_eq!(code, 0, "{name}");
         let time = |k: usize| number(&report, &format!("/toolpaths/{k}/path/machining_time_s"));
         assert!(time(0) <= 1.02 * time(2), "{name}: {} {}", time(0), time(2));

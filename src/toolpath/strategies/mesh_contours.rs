@@ -13,6 +13,7 @@ mod tests;
 
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between, whole_pass};
 use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
+use crate::surface::border::LEAST_FACING;
 use crate::surface::height_contours::HeightContours;
 use crate::vocabulary::{Contact, Faces, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
@@ -23,9 +24,6 @@ use part::{Part, SurfacePoint};
 use scallop::{FeedCurvature, SurfaceCurvature, strip_width_at};
 use std::f64::consts::FRAC_PI_2;
 use work::monitor::{self, Cancelled, Monitor};
-
-/// Least vertical part of the normal of a wall that faces up; less is upright, or rounding of the file.
-pub(super) const LEAST_FACING: f64 = 1e-4;
 
 /// Faces that contours serve. Those of a wall lie as close on it as it is steep, and halving an interval six
 /// times comes to a 64th of it: the sine of the least slope.

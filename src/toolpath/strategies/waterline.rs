@@ -9,9 +9,10 @@
 
 use std::fmt::{self, Write as _};
 
-use super::mesh_contours::{self, LEAST_FACING};
+use super::mesh_contours;
 use crate::levels::level_passes::along_levels;
 use crate::levels::spacing::{LevelSteps, level_tangent};
+use crate::surface::border::LEAST_FACING;
 use crate::surface::chart::Chart;
 use crate::surface::mesh_surface::STEEPEST_COSINE;
 use crate::vocabulary::{Definition, Lines, PartKind, PassSettings, Passes, PlanError, Strategy, Task};

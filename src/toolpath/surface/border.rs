@@ -16,8 +16,8 @@ use part::{Part, SurfacePoint};
 /// rounding of coordinates, a millionth of a cutter.
 const ON_BORDER: f64 = 1e-10;
 
-/// Faces whose normal has no more than this vertical part are walls.
-const WALL: f64 = 1e-4;
+/// Least vertical part of the normal of a wall that faces up; less is upright, or rounding of the file.
+pub(crate) const LEAST_FACING: f64 = 1e-4;
 
 /// Beside a rim nothing is looked for farther than this share of the part's size.
 const BESIDE_RIM: f64 = 1e-6;
@@ -67,8 +67,8 @@ impl<'a> Border<'a> {
         if part.patches().is_empty() {
             let beside = BESIDE_RIM * (part.bounds().diagonal() + 1.0);
             let is_rim = |t: usize, other: usize, [a, b]: [Point3; 2]| {
-                mesh.normal(t).z > WALL
-                    && mesh.normal(other).z <= WALL
+                mesh.normal(t).z > LEAST_FACING
+                    && mesh.normal(other).z <= LEAST_FACING
                     && (b - a).xy().try_normalize(0.0).is_some_and(|along| {
                         let out = nalgebra::center(&a, &b).xy() + Vector2::new(along.y, -along.x) * beside;
                         part.highest_at(out.x, out.y).is_none()
