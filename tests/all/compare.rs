@@ -368,6 +368,43 @@ fn a_pass_around_a_corner_serves_the_side_behind_it() {
     assert!(highest < 0.024, "{highest}");
 }
 
+/// Over sharp edges passes are as far apart as on each side of them alone, and an edge has a pass of its own where they
+/// run along it: the top of a block with chamfers takes no longer than by straight passes, and the first plan leaves no
+/// band along an edge.
+#[test]
+fn chamfered_blocks_are_planned_as_their_faces() {
+    let head = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.02\n";
+    let streamline = "[[toolpath]]\nstrategy = \"streamline\"\n";
+    let zigzag = "[[toolpath]]\nstrategy = \"zigzag\"\nangle = \"best\"\nlinks = \"surface\"\n";
+    let (code, report) = run_on(&chamfered(), &format!("{head}{streamline}{zigzag}"));
+    assert_eq!(code, 0);
+    let [time, straight] = [0, 1].map(|k| number(&report, &format!("/toolpaths/{k}/path/machining_time_s")));
+    assert!(time <= straight, "{time} {straight}");
+    // All faces are planes: the least is their area over one interval.
+    let least = number(&report, "/toolpaths/0/shortest/cutting_length_mm");
+    let area: f64 = chamfered().iter().map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm()).sum();
+    let interval = 2.0 * f64::sqrt(2.0 * 3.0 * 0.02 - 0.02 * 0.02);
+    assert!((least * interval / area - 1.0).abs() < 1e-3, "{least} {area} {interval}");
+    let (_, report) = run_on(&chamfered(), &format!("{head}correct = false\n{streamline}"));
+    let highest = number(&report, "/toolpaths/0/excess/max_mm");
+    assert!(highest < 0.03, "{highest}");
+}
+
+/// The top of a block of 24 × 16 mm and its chamfers of 1 mm.
+fn chamfered() -> Vec<[Point3; 3]> {
+    let ring = |inside: f64, z: f64| {
+        let (x, y) = (24.0 - inside, 16.0 - inside);
+        [[inside, inside], [x, inside], [x, y], [inside, y]].map(|[x, y]| Point3::new(x, y, z))
+    };
+    let (top, foot) = (ring(1.0, 0.0), ring(0.0, -1.0));
+    let side = |k: usize| {
+        let l = (k + 1) % 4;
+        [[top[k], foot[k], top[l]], [top[l], foot[k], foot[l]]]
+    };
+    let level = [[top[0], top[1], top[2]], [top[0], top[2], top[3]]];
+    (0..4).flat_map(side).chain(level).collect()
+}
+
 /// The disk with walls that go down from it and a floor.
 fn solid_disk() -> Vec<[Point3; 3]> {
     let down = |p: Point3| Point3::new(p.x, p.y, p.z - 5.0);

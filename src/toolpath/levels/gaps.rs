@@ -9,9 +9,8 @@
 //! those on the surface. Only what lies beside a pass is looked at, across it: a part without any pass nearby
 //! has no gaps.
 
-use std::collections::HashMap;
-
 use super::halving::{LevelSource, along_needed};
+use super::stretches::{Stretches, nearest_on};
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::vocabulary::{Contact, Passes, PlanError, Step};
 use cutter::Cutter;
@@ -60,12 +59,12 @@ pub(crate) fn close<S: LevelSource<Place = [f64; 2]>>(
     if reach <= 0.0 {
         return Ok(0);
     }
-    let mut gaps = Gaps { chart, cutter, height, reach, cubes: HashMap::new() };
+    let mut gaps = Gaps { chart, cutter, height, stretches: Stretches::new(reach) };
     let (planned, mut looked_at) = (passes.contacts.len(), 0);
     for _ in 0..ROUNDS {
         let fresh = &passes.contacts[looked_at..];
         looked_at = passes.contacts.len();
-        fresh.iter().for_each(|pass| gaps.insert(pass));
+        fresh.iter().for_each(|pass| gaps.stretches.insert(pass));
         let found = work::parallel::try_map(fresh.len(), |k| {
             monitor::check(monitor)?;
             Ok::<_, PlanError>(fresh[k].iter().flat_map(|contact| gaps.beside(contact)).collect::<Vec<_>>())
@@ -85,7 +84,7 @@ pub(crate) fn close<S: LevelSource<Place = [f64; 2]>>(
             let from_gap = |place: &[f64; 2]| (chart.jet(place[0], place[1]).p - open).norm();
             along_needed(source, level, &needed, &from_gap, sampling, passes, monitor)?;
             for k in before..passes.contacts.len() {
-                gaps.insert(&passes.contacts[k]);
+                gaps.stretches.insert(&passes.contacts[k]);
             }
         }
         if passes.contacts.len() == looked_at {
@@ -103,48 +102,19 @@ struct Gap {
     openness: f64,
 }
 
-/// Stretches of contacts in cubes.
+/// Places that no pass serves, beside stretches of those that there are.
 struct Gaps<'a, 'b> {
     chart: &'a Chart<'b>,
     cutter: &'a Cutter,
     /// The scallop height, mm.
     height: f64,
-    /// Side of a cube, and how far contacts are looked for, mm.
-    reach: f64,
-    cubes: HashMap<[i64; 3], Vec<[Point3; 2]>>,
+    stretches: Stretches,
 }
 
 impl Gaps<'_, '_> {
-    fn cube(&self, p: &Point3) -> [i64; 3] {
-        [p.x, p.y, p.z].map(|x| (x / self.reach).floor() as i64)
-    }
-
-    /// Adds the stretches of a pass.
-    fn insert(&mut self, pass: &[Contact]) {
-        for ends in pass.windows(2).map(|w| [w[0].at, w[1].at]) {
-            let corners = [ends[0].inf(&ends[1]), ends[0].sup(&ends[1])].map(|p| self.cube(&p));
-            let [lo, hi] = corners;
-            for i in lo[0]..=hi[0] {
-                for j in lo[1]..=hi[1] {
-                    for k in lo[2]..=hi[2] {
-                        self.cubes.entry([i, j, k]).or_default().push(ends);
-                    }
-                }
-            }
-        }
-    }
-
     /// The place of a pass nearest to a point, within reach.
     fn nearest(&self, p: &Point3) -> Option<Point3> {
-        let home = self.cube(p);
-        let around = (0..27).filter_map(|k| {
-            self.cubes.get(&[home[0] + k % 3 - 1, home[1] + k / 3 % 3 - 1, home[2] + k / 9 - 1])
-        });
-        let on = around.flatten().map(|[a, b]| {
-            let d = b - a;
-            let t = (p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE);
-            a + d * t.clamp(0.0, 1.0)
-        });
+        let on = self.stretches.around(p).map(|ends| nearest_on(ends, p));
         on.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared()))
     }
 

@@ -166,15 +166,26 @@ pub(crate) fn along_needed<S: LevelSource>(
     let nearest = places.min_by(|a, b| a.1.total_cmp(&b.1));
     let nearest = nearest.filter(|(_, distance)| *distance <= sampling).map(|(point, _)| point);
     for (c, curve) in curves.into_iter().enumerate() {
-        let (curve, runs) = filler.stretches(curve, |k, points| {
+        filler.add_stretches(curve, level, passes, |k, points| {
             let wanted = nearest == Some((c, k)) || needed(&points[k]);
             wanted.then(|| source.allowed(&points[k]).map(|allowed| allowed.width)).flatten()
-        });
-        for run in runs {
-            filler.add(&curve, level, Some(run), passes)?;
-        }
+        })?;
     }
     Ok(())
+}
+
+/// Appends passes along the stretches of a curve that is no level for whose points `width` gives an interval,
+/// mm, with their overlap.
+pub(crate) fn along_stretches<S: LevelSource>(
+    source: &S,
+    curve: Track<S::Place>,
+    width: &dyn Fn(usize) -> Option<f64>,
+    sampling: f64,
+    passes: &mut Passes,
+    monitor: &dyn Monitor,
+) -> Result<(), PlanError> {
+    let filler = Filler { source, sampling, monitor };
+    filler.add_stretches(curve, f64::NAN, passes, |k, _| width(k))
 }
 
 /// A range of ψ between two passes; at an open end stands the end of the range, not a pass.
@@ -232,6 +243,18 @@ impl<S: LevelSource> Filler<'_, S> {
             passes.contacts.push(contacts(k));
         }
         Ok(())
+    }
+
+    /// Appends the passes along the stretches of a curve for whose points `width` gives an interval, mm.
+    fn add_stretches(
+        &self,
+        curve: Track<S::Place>,
+        level: f64,
+        passes: &mut Passes,
+        width: impl Fn(usize, &[S::Place]) -> Option<f64>,
+    ) -> Result<(), PlanError> {
+        let (curve, runs) = self.stretches(curve, width);
+        runs.into_iter().try_for_each(|run| self.add(&curve, level, Some(run), passes))
     }
 
     /// Appends the further passes that a gap needs.

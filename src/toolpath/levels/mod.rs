@@ -11,3 +11,4 @@ pub mod planes;
 pub mod planned_field;
 pub mod spacing;
 pub mod spirals;
+pub mod stretches;

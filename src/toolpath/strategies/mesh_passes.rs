@@ -6,6 +6,8 @@
 //! run through by a smooth curve of the places of the cutter's axis; every height comes from dropping
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
+mod edges;
+
 use super::iso_scallop::{FrontStart, StartedFront};
 use super::mesh_front::{along_surface, best_on_piece, fronts_over, put_on_level};
 use super::mesh_shortest::shortest_streams;
@@ -25,7 +27,7 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use field::mesh::{Bend, FieldMesh, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
+use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
 use field::{DIRECTION_WEIGHT, Packed, ScalarField};
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::Part;
@@ -92,9 +94,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     if let Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) = aim {
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
-    // Fronts are spaced by the smooth surface over the mesh; what that leaves at edges is measured.
-    let is_front = matches!(aim, Aim::Front(_));
-    let reached = reachable(part, cutter, if is_front { 0.0 } else { flat })?;
+    let reached = reachable(part, cutter)?;
     if reached.steep_area >= LEAST_TOLD {
         all.notes.push(format!(
             "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \
@@ -187,7 +187,7 @@ fn on_piece(
     let mut best: Option<(f64, Passes)> = None;
     let several = functions.len() > 1;
     for levelled in functions {
-        let passes = along_function(task, aim, &piece.mesh, surface, &wanted, levelled)?;
+        let passes = along_function(task, aim, piece, surface, &wanted, levelled)?;
         let worth = match aim {
             Aim::Shortest(_, objective) if several => objective.worth(task, &passes)?,
             Aim::Front(_) => Objective::Length.worth(task, &passes)?,
@@ -221,7 +221,7 @@ fn along_borders(task: &Task<'_>, piece: &ConnectedPiece, surface: &MeshSurface)
 fn along_function(
     task: &Task<'_>,
     aim: Aim,
-    piece: &FieldMesh,
+    piece: &ConnectedPiece,
     surface: &MeshSurface,
     wanted: &[Wanted],
     levelled: Levelled,
@@ -258,7 +258,14 @@ fn along_function(
     let placed = place_levels(&places, range, lines.steps(), &mut notes);
     let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
     passes.notes.splice(0..0, notes);
-    let rows = direction.map(|direction| asked::on_mesh(direction, part, piece, settings.sampling));
+    let along = edges::serve(&guide, &piece.sharp, &mut passes)?;
+    if along > 0 {
+        let plural = if along == 1 { "pass runs" } else { "passes run" };
+        passes
+            .notes
+            .push(format!("{along} short {plural} along sharp edges that the others do not reach over"));
+    }
+    let rows = direction.map(|direction| asked::on_mesh(direction, part, &piece.mesh, settings.sampling));
     passes.obedience = obedience::measure(&passes.contacts, &rows.unwrap_or_default());
     planned_field::set_mesh_levels(&mut passes.field, &guide.on.levels, range, surface.own_triangles);
     if matches!(aim, Aim::Shortest(None, _)) {
@@ -354,6 +361,8 @@ struct Spot {
     axis: Point2,
     /// What neighbouring passes may do here.
     allowed: Allowed,
+    /// Whether the axis turns sharply here: the cutter begins or ends to roll over an edge.
+    turns: bool,
 }
 
 /// A point of a level curve before it is evened out.
@@ -596,52 +605,71 @@ impl MeshGuide<'_> {
         useful_overrun(along / square.max(1e-9)) * allowed.width
     }
 
-    /// The curve at even distances, evened out.
+    /// The place at `s` between two knots.
+    fn spot(&self, a: &Knot, b: &Knot, s: f64, turns: bool) -> Spot {
+        let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
+        let at = self.on.in_triangle(a.triangle, a.contact + (b.contact - a.contact) * t);
+        let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
+        let allowed = self.allowed_at(&at).map_or(nowhere, |(allowed, _)| allowed);
+        Spot { at, axis: a.axis + (b.axis - a.axis) * t, allowed, turns }
+    }
+
+    /// The curve at even distances from each sharp turn to the next, evened out.
     fn track(&self, curve: &MeshCurve) -> Option<Track<Spot>> {
         let knots = self.knots(curve);
         let (from, to) = (knots.first()?.s, knots.last()?.s);
         if to <= from {
             return None;
         }
-        let count =
-            ((to - from) / self.settings.sampling).ceil().max(if curve.closed { 5.0 } else { 1.0 }) as usize;
-        let points = if curve.closed { count } else { count + 1 };
-        let mut k = 0;
-        let mut spots = Vec::with_capacity(points);
-        for n in 0..points {
-            let s = from + (to - from) * n as f64 / count as f64;
-            while k + 2 < knots.len() && knots[k + 1].s < s {
-                k += 1;
+        let rolls = |w: &[Knot]| w[0].contact == w[1].contact && (w[1].axis - w[0].axis).norm() > SAME_AXIS;
+        let turns = knots.windows(2).filter(|w| rolls(w)).flat_map(|w| [w[0].s, w[1].s]);
+        let mut ends = vec![from];
+        for s in turns.chain([to]) {
+            if s - ends[ends.len() - 1] > SAME_AXIS {
+                ends.push(s);
             }
-            let (a, b) = (&knots[k], &knots[k + 1]);
-            let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
-            let contact = a.contact + (b.contact - a.contact) * t;
-            let at = self.on.in_triangle(a.triangle, contact);
-            let allowed = self.allowed_at(&at).map(|(allowed, _)| allowed);
-            let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
-            spots.push(Spot {
-                at,
-                axis: a.axis + (b.axis - a.axis) * t,
-                allowed: allowed.unwrap_or(nowhere),
-            });
+        }
+        let least = if curve.closed { 5.0 } else { 1.0 };
+        let mut k = 0;
+        let mut spots = Vec::new();
+        for (piece, w) in ends.windows(2).enumerate() {
+            let count = ((w[1] - w[0]) / self.settings.sampling).ceil().max(least) as usize;
+            for n in 0..count {
+                let s = w[0] + (w[1] - w[0]) * n as f64 / count as f64;
+                while k + 2 < knots.len() && knots[k + 1].s < s {
+                    k += 1;
+                }
+                spots.push(self.spot(&knots[k], &knots[k + 1], s, n == 0 && piece > 0));
+            }
+        }
+        if !curve.closed {
+            let [a, b] = [&knots[knots.len() - 2], &knots[knots.len() - 1]];
+            spots.push(self.spot(a, b, to, false));
         }
         even_out(&mut spots, curve.closed);
         Some(Track { points: spots, closed: curve.closed })
     }
 }
 
-/// A smooth curve through the places of the axis, a unit from each to the next (Catmull and Rom 1974).
+/// A curve through the places of the axis, a unit from each to the next (Catmull and Rom 1974), smooth but
+/// where these turn sharply.
 struct Smooth {
     axes: Vec<Point2>,
+    turns: Vec<bool>,
     closed: bool,
 }
 
 impl Smooth {
+    fn through(spots: &[Spot], closed: bool) -> Self {
+        let axes = spots.iter().map(|spot| spot.axis).collect();
+        Self { axes, turns: spots.iter().map(|spot| spot.turns).collect(), closed }
+    }
+
     fn before(&self, k: usize) -> Point2 {
         let (axes, last) = (&self.axes, self.axes.len() - 1);
         match k {
             0 if self.closed => axes[last - 1],
-            0 => axes[0] + (axes[0] - axes[1]),
+            k if k == 0 || self.turns[k] => axes[k] + (axes[k] - axes[k + 1]),
             k => axes[k - 1],
         }
     }
@@ -649,9 +677,9 @@ impl Smooth {
     fn after(&self, k: usize) -> Point2 {
         let (axes, last) = (&self.axes, self.axes.len() - 1);
         match k {
-            k if k < last => axes[k + 1],
-            _ if self.closed => axes[1],
-            _ => axes[last] + (axes[last] - axes[last - 1]),
+            k if k < last && !self.turns[k] => axes[k + 1],
+            k if k == last && self.closed => axes[1],
+            k => axes[k] + (axes[k] - axes[k - 1]),
         }
     }
 
@@ -667,7 +695,8 @@ impl Smooth {
     }
 }
 
-/// Takes the wiggle of linear elements out of a curve, within bounds; the ends of open ones stay.
+/// Takes the wiggle of linear elements out of a curve, within bounds; the ends of open ones and sharp turns
+/// stay.
 fn even_out(spots: &mut [Spot], closed: bool) {
     let n = spots.len();
     if n < 5 {
@@ -678,6 +707,9 @@ fn even_out(spots: &mut [Spot], closed: bool) {
         let old: Vec<Point2> = spots.iter().map(|s| s.axis).collect();
         let inner = if closed { 0..n } else { 2..n - 2 };
         for k in inner {
+            if (0..3).any(|j| spots[(k + n + j - 1) % n].turns) {
+                continue;
+            }
             let mean: Vector2 = (0..5).map(|j| old[(k + n + j - 2) % n].coords * EVEN[j]).sum();
             let off = Point2::from(mean) - before[k];
             let most = MOST_MOVED * spots[k].allowed.width;
@@ -705,7 +737,7 @@ impl LevelSource for MeshGuide<'_> {
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
         let Some((spots, [first, end])) = curve.opened(run) else { return Vec::new() };
-        let smooth = Smooth { axes: spots.iter().map(|s| s.axis).collect(), closed: curve.closed };
+        let smooth = Smooth::through(&spots, curve.closed);
         let contact = |n: usize| {
             let s = first as f64 + n as f64 / self.parts as f64;
             let k = (s as usize).min(spots.len() - 2);
@@ -727,7 +759,7 @@ impl LevelSource for MeshGuide<'_> {
         if run.is_some() && !spots[first..=end].iter().any(own) {
             return Ok(Vec::new());
         }
-        let smooth = Smooth { axes: spots.iter().map(|s| s.axis).collect(), closed: curve.closed };
+        let smooth = Smooth::through(&spots, curve.closed);
         let mut tip = |s: f64| {
             let at = smooth.at(s).0;
             self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))

@@ -355,7 +355,7 @@ mod tests {
         let (part, cutter) = (hills(), Cutter::ball(6.0).unwrap());
         let step = Step::Scallop(0.02);
         let flat = level_interval(&cutter, 0.02);
-        let piece = &reachable(&part, &cutter, flat).unwrap().pieces[0];
+        let piece = &reachable(&part, &cutter).unwrap().pieces[0];
         let surface = MeshSurface::with_margin(piece, flat).unwrap();
         let coarser = surface.coarser(piece, &cutter).unwrap();
         assert!(3 * coarser.0.mesh.points().len() < surface.mesh.points().len());

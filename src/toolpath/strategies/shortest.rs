@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 use super::direction_keys;
 use super::iso_scallop::{border_name, fronts, places};
-use super::mesh_passes::{self, Aim, level_interval, widest_at};
+use super::mesh_passes::{self, Aim, widest_at};
 use super::stream_search::{Found, Prices, Search};
 use crate::levels::level_passes::along_levelled;
 use crate::levels::{obedience, planned_field, spirals};
@@ -77,7 +77,7 @@ pub fn shortest_possible(
 ) -> Result<ShortestPossible, PlanError> {
     let mut all: Vec<Least> = Vec::new();
     if part.patches().is_empty() && wants_mesh(part, cutter) {
-        for piece in reachable(part, cutter, level_interval(cutter, h))?.pieces {
+        for piece in reachable(part, cutter)?.pieces {
             let mesh = &piece.mesh;
             let of_facet = |t: usize| {
                 monitor::check(monitor)?;

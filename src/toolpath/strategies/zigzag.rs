@@ -378,7 +378,7 @@ impl<'a> Ground<'a> {
         let Task { part, cutter, ref settings, .. } = *task;
         let has_creases = part.patches().is_empty() && wants_mesh(part, cutter);
         // What is no surface still has heights for charts.
-        let Some(reached) = has_creases.then(|| reachable(part, cutter, 0.0).ok()).flatten() else {
+        let Some(reached) = has_creases.then(|| reachable(part, cutter).ok()).flatten() else {
             return Self::Charts(charts.iter().map(|chart| Net::of(chart, task)).collect());
         };
         let correction = settings.guide().correction;

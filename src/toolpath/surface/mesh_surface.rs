@@ -5,8 +5,7 @@
 //! mesh both are fitted to the vertices of each smooth sheet. Heights of cutter locations come from
 //! dropping the cutter on the part itself, as always.
 
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::{HashMap, HashSet};
 
 use crate::vocabulary::PlanError;
 use cutter::Cutter;
@@ -46,12 +45,6 @@ const CREASE_COSINE: f64 = 0.866;
 /// the slips of a tessellation.
 const CREASES_OVER_RADIUS: f64 = 2.0;
 
-/// Beside a sharp edge the surface counts as this many times as convex as the cutter, falling to nothing
-/// [`SHARPENED_INTERVALS`] away from it: half an interval away it is three times, which halves the interval.
-const SHARPENED_OVER_CUTTER: f64 = 4.5;
-/// See [`SHARPENED_OVER_CUTTER`].
-const SHARPENED_INTERVALS: f64 = 1.5;
-
 /// Triangles of a tessellation lower than this many times its deviation do not tell of creases.
 const LEAST_HEIGHT_OVER_DEVIATION: f64 = 10.0;
 
@@ -85,6 +78,8 @@ pub(crate) struct MeshSurface {
 pub(crate) struct ConnectedPiece {
     /// Its triangles, with the mean normals at vertices.
     pub mesh: FieldMesh,
+    /// Sharp edges that stand out between two of its triangles: one of them, and its side.
+    pub sharp: Vec<[usize; 2]>,
     /// Curvature at the vertices.
     pub bends: Vec<Bend>,
     /// Normals at the corners of each triangle, of its own side of any crease.
@@ -153,12 +148,11 @@ pub(crate) fn fills_its_rectangle(part: &Part) -> bool {
     (area - size.x * size.y).abs() <= BESIDE * area
 }
 
-/// Everything of a part that passes along the surface can reach; `interval` (mm) is their distance on
-/// level ground, or 0 where sharp edges are not to bring them nearer.
+/// Everything of a part that passes along the surface can reach.
 ///
 /// # Errors
 /// When the part's triangles do not make a surface, or nothing of it faces up.
-pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<Reachable, PlanError> {
+pub(crate) fn reachable(part: &Part, cutter: &Cutter) -> Result<Reachable, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = part.mesh();
     let (points, triangles) = if part.patches().len() > 1 {
@@ -200,8 +194,7 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
         }
     });
     own_normals(&refined, &state, &corner_normals, &mut normals);
-    let inner = between_open(&refined, &state, &creases);
-    sharpen(&refined, &inner, &normals, &mut bends, cutter, interval);
+    let sharp = between_open(&refined, &state, &creases);
     let steep_area = state.iter().map(|s| if let State::Steep(area) = s { *area } else { 0.0 }).sum();
     let kept: Vec<usize> = (0..state.len()).filter(|&t| matches!(state[t], State::Open)).collect();
     let open: Vec<[u32; 3]> = kept.iter().map(|&t| refined.triangles[t]).collect();
@@ -211,6 +204,10 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
     }
     let (all, kept) = compacted(&refined.points, &open, Some(&normals)).map_err(refused)?;
     let bends: Vec<Bend> = kept.iter().map(|&v| bends[v as usize]).collect();
+    let is_sharp = |[a, b]: [u32; 2]| {
+        let [a, b] = [a, b].map(|v| kept[v as usize]);
+        sharp.contains(&[a.min(b), a.max(b)])
+    };
     let (piece, count) = all.pieces();
     let mut of_piece: Vec<Vec<usize>> = vec![Vec::new(); count];
     for (t, corners) in all.triangles().iter().enumerate() {
@@ -220,9 +217,17 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
         .iter()
         .map(|own| {
             let triangles: Vec<[u32; 3]> = own.iter().map(|&t| all.triangles()[t]).collect();
+            // One of the two triangles at an edge runs from its lesser to its greater vertex.
+            let sides = (0..triangles.len()).flat_map(|t| [0, 1, 2].map(|k| [t, k]));
+            let from_lesser = sides.filter(|&[t, k]| {
+                let (a, b) = (triangles[t][k], triangles[t][(k + 1) % 3]);
+                a < b && is_sharp([a, b])
+            });
+            let sharp = from_lesser.collect();
             let (mesh, kept) = compacted(all.points(), &triangles, Some(all.normals()))?;
             Ok(ConnectedPiece {
                 mesh,
+                sharp,
                 bends: kept.iter().map(|&v| bends[v as usize]).collect(),
                 corner_normals: own.iter().map(|&t| corner_normals[t]).collect(),
             })
@@ -252,9 +257,9 @@ fn own_normals(refined: &Refined, state: &[State], corner_normals: &[[Vector3; 3
     }
 }
 
-/// Of the creases that stand out those between two triangles that are reached. At a rim passes end as at
-/// every border.
-fn between_open(refined: &Refined, state: &[State], creases: &[([u32; 2], bool)]) -> Vec<[u32; 2]> {
+/// Of the creases that stand out those between two triangles that are reached, from their lesser to their
+/// greater point. At a rim passes end as at every border.
+fn between_open(refined: &Refined, state: &[State], creases: &[([u32; 2], bool)]) -> HashSet<[u32; 2]> {
     let mut sides: HashMap<[u32; 2], u32> = creases.iter().filter(|c| c.1).map(|c| (c.0, 0)).collect();
     for (corners, _) in refined.triangles.iter().zip(state).filter(|(_, state)| matches!(state, State::Open))
     {
@@ -265,60 +270,7 @@ fn between_open(refined: &Refined, state: &[State], creases: &[([u32; 2], bool)]
             }
         }
     }
-    creases.iter().map(|c| c.0).filter(|edge| sides.get(edge) == Some(&2)).collect()
-}
-
-/// Gives sharp edges the curvature that halves the interval across them. Passes on both sides of an edge
-/// do not reach over it: each has to leave no more than the scallop up to the edge, so the last of them
-/// must be within half an interval of it, wherever the other one is.
-fn sharpen(
-    refined: &Refined,
-    creases: &[[u32; 2]],
-    normals: &[Vector3],
-    bends: &mut [Bend],
-    cutter: &Cutter,
-    interval: f64,
-) {
-    let mut edge_at: Vec<Option<Vector3>> = vec![None; normals.len()];
-    let mut open = BinaryHeap::new();
-    for &[a, b] in creases {
-        let along = refined.points[b as usize] - refined.points[a as usize];
-        for v in [a, b] {
-            edge_at[v as usize] = Some(along);
-            open.push((Reverse(0u64), v, v));
-        }
-    }
-    if open.is_empty() || interval <= 0.0 {
-        return;
-    }
-    let mut next: Vec<Vec<u32>> = vec![Vec::new(); normals.len()];
-    for t in &refined.triangles {
-        for k in 0..3 {
-            next[t[k] as usize].push(t[(k + 1) % 3]);
-            next[t[(k + 1) % 3] as usize].push(t[k]);
-        }
-    }
-    let reach = SHARPENED_INTERVALS * interval;
-    let mut done = vec![false; normals.len()];
-    // Distances are not negative, so that their bits are in their order.
-    while let Some((Reverse(bits), v, from)) = open.pop() {
-        if std::mem::replace(&mut done[v as usize], true) {
-            continue;
-        }
-        let distance = f64::from_bits(bits);
-        let Some(along) = edge_at[from as usize] else { continue };
-        let across = normals[v as usize].cross(&along).try_normalize(0.0);
-        let curvature = -SHARPENED_OVER_CUTTER / cutter.radius() * (1.0 - distance / reach);
-        if let Some(across) = across {
-            bends[v as usize].add(&Bend::new(&across, &across, [curvature, 0.0, 0.0]), 1.0);
-        }
-        for &w in &next[v as usize] {
-            let distance = distance + (refined.points[w as usize] - refined.points[v as usize]).norm();
-            if distance < reach && !done[w as usize] {
-                open.push((Reverse(distance.to_bits()), w, from));
-            }
-        }
-    }
+    sides.into_iter().filter(|&(_, count)| count == 2).map(|(edge, _)| edge).collect()
 }
 
 /// What can be done about a triangle from above.
@@ -374,7 +326,7 @@ impl MeshSurface {
     /// # Errors
     /// When strip and piece do not make a surface.
     pub fn with_margin(piece: &ConnectedPiece, width: f64) -> Result<Self, PlanError> {
-        let ConnectedPiece { mesh: piece, bends, corner_normals } = piece;
+        let ConnectedPiece { mesh: piece, bends, corner_normals, .. } = piece;
         let mut corner_normals = corner_normals.clone();
         let (mut points, mut triangles) = (piece.points().to_vec(), piece.triangles().to_vec());
         let (mut normals, mut bends) = (piece.normals().to_vec(), bends.clone());
@@ -451,6 +403,7 @@ impl MeshSurface {
             mesh: coarser.mesh.clone(),
             bends: coarser.of_finer(&piece.bends),
             corner_normals,
+            sharp: Vec::new(),
         };
         Some((Self::with_margin(&piece, self.margin).ok()?, coarser))
     }
@@ -516,7 +469,7 @@ mod tests {
         let walls = (0..8).map(|t| part.mesh().normal(t).z - 80f64.to_radians().cos());
         let off: Vec<f64> = walls.collect();
         assert!(off.iter().all(|off| off.abs() < 1e-4) && off.iter().any(|off| *off < -2e-7), "{off:?}");
-        let reached = reachable(&part, &Cutter::ball(6.0).unwrap(), 0.7).unwrap();
+        let reached = reachable(&part, &Cutter::ball(6.0).unwrap()).unwrap();
         assert!(reached.steep_area == 0.0, "{}", reached.steep_area);
     }
 }
