@@ -3,12 +3,13 @@
 //! Enters: any soup of triangles. Leaves: a manifold, consistently oriented mesh in which every
 //! triangle has an area, with its neighbours, or the reason why that soup is none.
 //!
-//! Vertices are merged only where their coordinates are equal. A tolerance would close more seams,
-//! but "close to" is not transitive: a chain of merged vertices can swallow a narrow feature.
+//! Vertices are merged where their coordinates are equal. Within a tolerance they are only where asked for
+//! ([`TriangleMesh::welded`], for files), along open edges, and where that swallows no narrow feature.
 
 mod repair;
 #[cfg(test)]
 mod tests;
+mod weld;
 
 use super::{Aabb, Point3, Vector3, distance_to_segment};
 
@@ -24,6 +25,8 @@ pub struct TriangleMesh {
     bounds: Aabb,
     /// The first edge that was left open because no surface runs on there, as its refusal.
     junction: Option<Box<MeshError>>,
+    /// See [`TriangleMesh::moved`].
+    moved: f64,
 }
 
 /// Stands for "no triangle" in neighbour lists.
@@ -46,11 +49,17 @@ enum Junctions {
 }
 
 /// What was changed to make a mesh usable.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RepairNotes {
     /// Vertices merged because they coincide. An STL file states every corner anew, so there this
     /// is no defect.
     pub merged_vertices: usize,
+    /// Vertices welded to others because they coincide but for rounding.
+    pub welded_vertices: usize,
+    /// Edges split at vertices that lie on them but for rounding.
+    pub split_edges: usize,
+    /// How far welding and splitting moved the surface at most, mm.
+    pub moved: f64,
     /// Degenerate triangles (without area) dropped.
     pub dropped_degenerate: usize,
     /// Triangles dropped because the same three corners had occurred before.
@@ -79,6 +88,12 @@ impl std::fmt::Display for RepairNotes {
             }
         };
         count(self.merged_vertices, "merged", "coincident vertex", "coincident vertices", "");
+        let by = match self.moved {
+            by if by > 0.0 => format!(" within {:.1e} mm", two_digits_up(by)),
+            _ => String::new(),
+        };
+        count(self.welded_vertices, "welded", "vertex", "vertices", &format!(" to others{by}"));
+        count(self.split_edges, "split", "edge", "edges", &format!(" at vertices on them{by}"));
         count(self.dropped_degenerate, "dropped", "triangle", "triangles", " without area");
         count(self.dropped_duplicates, "dropped", "duplicate triangle", "duplicate triangles", "");
         count(self.flipped_triangles, "turned over", "triangle", "triangles", " against the rest");
@@ -182,6 +197,12 @@ pub enum MeshError {
     },
 }
 
+/// A number above 0 rounded up to two digits.
+fn two_digits_up(x: f64) -> f64 {
+    let digit = 10_f64.powf(x.log10().floor() - 1.0);
+    (x / digit).ceil() * digit
+}
+
 fn show(p: &[f64; 3]) -> String {
     format!("{}, {}, {}", p[0], p[1], p[2])
 }
@@ -216,7 +237,7 @@ impl TriangleMesh {
         triangles: Vec<[u32; 3]>,
         outside: Outside,
     ) -> Result<(Self, RepairNotes, Vec<[u32; 3]>), MeshError> {
-        repair::repair(vertices, triangles, outside, Junctions::Refused)
+        repair::repair(vertices, triangles, outside, Junctions::Refused, 0.0)
     }
 
     /// As [`TriangleMesh::new`] for meshes that need not be a surface: an edge where more than two triangles
@@ -227,8 +248,31 @@ impl TriangleMesh {
     /// # Errors
     /// See [`MeshError`]; neither [`MeshError::NonManifoldEdge`] nor [`MeshError::NotOrientable`].
     pub fn opened(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<(Self, RepairNotes), MeshError> {
-        let repaired = repair::repair(vertices, triangles, Outside::Found, Junctions::Opened);
+        Self::welded(vertices, triangles, 0.0)
+    }
+
+    /// As [`TriangleMesh::opened`] for vertices that rounding moved by up to about `tolerance`, mm. Vertices at open
+    /// edges that lie within it of each other are welded, and open edges are split at vertices of others that lie
+    /// within it of them. Left open is what would collapse or turn triangles over, join some that do not face the
+    /// same side as given, fold two sheets onto each other, or lead a third triangle to an edge.
+    ///
+    /// # Tolerance
+    /// No place of the surface is moved by more than [`TriangleMesh::moved`], at most twice `tolerance`.
+    ///
+    /// # Errors
+    /// As [`TriangleMesh::opened`].
+    pub fn welded(
+        vertices: Vec<Point3>,
+        triangles: Vec<[u32; 3]>,
+        tolerance: f64,
+    ) -> Result<(Self, RepairNotes), MeshError> {
+        let repaired = repair::repair(vertices, triangles, Outside::Found, Junctions::Opened, tolerance);
         repaired.map(|(mesh, notes, _)| (mesh, notes))
+    }
+
+    /// How far this surface lies off the triangles that were given at most, mm; 0 where nothing was welded.
+    pub fn moved(&self) -> f64 {
+        self.moved
     }
 
     /// For what needs a surface with two sides.
@@ -302,7 +346,8 @@ impl TriangleMesh {
     /// [`MeshError::Empty`] when nothing with an area is left of it.
     pub fn scaled(&self, factor: f64) -> Result<Self, MeshError> {
         let vertices = self.vertices.iter().map(|p| p * factor).collect();
-        Self::opened(vertices, self.triangles.clone()).map(|(mesh, _)| mesh)
+        let (mesh, _) = Self::opened(vertices, self.triangles.clone())?;
+        Ok(Self { moved: self.moved * factor, ..mesh })
     }
 
     /// Bounds of all vertices.

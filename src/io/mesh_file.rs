@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use geometry::{MAX_COORDINATE, MeshError, RepairNotes, TriangleMesh};
+use geometry::{MAX_COORDINATE, MeshError, Point3, RepairNotes, TriangleMesh};
 
 use crate::regular;
 
@@ -165,23 +165,25 @@ pub struct MeshFormat {
     pub word: &'static str,
     /// The extensions of its files, lower case.
     pub extensions: &'static [&'static str],
-    pub(super) parse: fn(&[u8]) -> Parsed,
+    pub(super) read: fn(&[u8]) -> Result<Corners, MeshFileError>,
     /// Triangles that a file has at least, counted in a glance.
     pub(super) count: fn(&[u8]) -> usize,
 }
 
 /// What is read of a mesh file at most.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshLimits {
     /// Its size.
     pub bytes: u64,
     /// Its triangles.
     pub triangles: usize,
+    /// Vertices that are one but for rounding are welded over no more than this, in the file's unit.
+    pub weld: f64,
 }
 
 impl Default for MeshLimits {
     fn default() -> Self {
-        Self { bytes: MAX_BYTES, triangles: usize::MAX }
+        Self { bytes: MAX_BYTES, triangles: usize::MAX, weld: f64::INFINITY }
     }
 }
 
@@ -213,7 +215,8 @@ impl MeshFormat {
                 most: limits.triangles,
             });
         }
-        (self.parse)(&bytes).map_err(|source| MeshReadError::Content { path: path.to_owned(), source })
+        let parsed = (self.read)(&bytes).and_then(|corners| corners.mesh(limits.weld));
+        parsed.map_err(|source| MeshReadError::Content { path: path.to_owned(), source })
     }
 }
 
@@ -231,6 +234,35 @@ impl std::fmt::Debug for MeshFormat {
 
 /// A mesh with what was changed to make it one, or why it is none.
 pub(super) type Parsed = Result<(TriangleMesh, RepairNotes), MeshFileError>;
+
+/// The triangles of a file.
+pub(super) struct Corners {
+    /// Places, in the file's unit.
+    pub vertices: Vec<Point3>,
+    /// Corners, as indices of them.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Corners that are one but for rounding lie a step of f32 apart along each axis, 1.73 steps in space; and a
+/// corner in the middle of an edge lies as far off it, since the three are rounded by half a step each. So many
+/// steps leave room for the rounding of these distances.
+const STEPS: f64 = 2.0;
+
+impl Corners {
+    /// A mesh of them. Neighbours that a modeller or its exporter rounded apart are welded, up to `most`.
+    pub fn mesh(self, most: f64) -> Parsed {
+        let tolerance = self.rounding().min(most);
+        Ok(TriangleMesh::welded(self.vertices, self.triangles, tolerance)?)
+    }
+
+    /// How far rounding to f32 may set copies of a corner apart. Formats and modellers that store doubles often
+    /// got them from f32, or from calculations that agree no better.
+    fn rounding(&self) -> f64 {
+        let used = self.triangles.iter().flatten().filter_map(|&v| self.vertices.get(v as usize));
+        let largest = used.fold(0.0, |largest: f64, p| largest.max(p.coords.amax())) as f32;
+        STEPS * (f64::from(largest.next_up()) - f64::from(largest))
+    }
+}
 
 /// The bytes of a file of at most `most`.
 fn bytes_of(path: &Path, most: u64) -> Result<Vec<u8>, MeshReadError> {

@@ -14,11 +14,12 @@ mod tests;
 
 use std::path::Path;
 
-use super::mesh_file::{FilePlace, MeshFileError, MeshFormat, MeshReadError, number, unexpected};
+use super::mesh_file::{Corners, FilePlace, MeshFileError, MeshFormat, MeshReadError, number, unexpected};
 use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// Wavefront OBJ.
-pub(super) const FORMAT: MeshFormat = MeshFormat { word: "OBJ", extensions: &["obj"], parse, count: faces };
+pub(super) const FORMAT: MeshFormat =
+    MeshFormat { word: "OBJ", extensions: &["obj"], read: corners, count: faces };
 
 /// Most corners of a face. Cutting a face takes time with their square, at worst with their cube.
 const MAX_CORNERS: usize = 2_000;
@@ -39,6 +40,11 @@ pub fn read(path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
 /// # Errors
 /// See [`MeshFileError`].
 pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError> {
+    corners(bytes)?.mesh(f64::INFINITY)
+}
+
+/// The faces of a file as triangles.
+fn corners(bytes: &[u8]) -> Result<Corners, MeshFileError> {
     if bytes.is_empty() {
         return Err(MeshFileError::Empty);
     }
@@ -60,7 +66,7 @@ pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError>
         }
         file.statement(&statement, FilePlace::Line(k + 1))?;
     }
-    Ok(TriangleMesh::opened(file.vertices, file.triangles)?)
+    Ok(Corners { vertices: file.vertices, triangles: file.triangles })
 }
 
 /// The faces of a file, each of which gives a triangle or more.

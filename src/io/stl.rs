@@ -16,13 +16,13 @@ mod tests;
 use std::path::Path;
 
 use super::mesh_file::{
-    FilePlace, MeshFileError, MeshFormat, MeshReadError, Parsed, coordinate, number, unexpected,
+    Corners, FilePlace, MeshFileError, MeshFormat, MeshReadError, coordinate, number, unexpected,
 };
 use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// STL, binary or text.
 pub(super) const FORMAT: MeshFormat =
-    MeshFormat { word: "STL", extensions: &["stl"], parse, count: triangles };
+    MeshFormat { word: "STL", extensions: &["stl"], read: corners, count: triangles };
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -47,7 +47,12 @@ pub fn read(path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
 /// # Errors
 /// See [`MeshFileError`].
 pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError> {
-    let corners = match count(bytes) {
+    corners(bytes)?.mesh(f64::INFINITY)
+}
+
+/// The triangles of a file, each of which states its own corners.
+fn corners(bytes: &[u8]) -> Result<Corners, MeshFileError> {
+    let vertices = match count(bytes) {
         Some((declared, expected)) if expected == bytes.len() as u64 => binary(bytes, declared)?,
         _ if bytes.is_empty() => return Err(MeshFileError::Empty),
         _ if is_text(bytes) => text(bytes)?,
@@ -56,7 +61,8 @@ pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError>
         }
         None => return Err(MeshFileError::TooShort { bytes: bytes.len() }),
     };
-    soup(corners)
+    let triangles = (0..vertices.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    Ok(Corners { vertices, triangles })
 }
 
 /// The triangles that a file has if it is whole.
@@ -101,12 +107,6 @@ fn binary(bytes: &[u8], declared: u32) -> Result<Vec<Point3>, MeshFileError> {
         corners.extend(numbers.chunks_exact(3).map(Point3::from_slice));
     }
     Ok(corners)
-}
-
-/// A mesh from triangles that each state their own corners.
-fn soup(corners: Vec<Point3>) -> Parsed {
-    let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Ok(TriangleMesh::opened(corners, triangles)?)
 }
 
 /// The words of a text with the lines they stand in.

@@ -66,8 +66,8 @@ pub(crate) fn left_over(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Rest, Jo
     };
     let Run { session, request, whole, .. } = *run;
     let task = session.task(request, (&whole.path, &whole.cutters), &run.scene().simulation, &session.cells);
-    // Programs may be as far off the moves.
-    let limit = run.scene().tolerance.scallop - whole.path.origin.strays;
+    // Programs may be as far off the moves, and the files' surfaces off the meshes.
+    let limit = run.scene().tolerance.scallop - whole.path.origin.strays - session.moved();
     let between = cells_above(&task, cut, limit, monitor).map_err(run.heights())?;
     let stands = run.measurement().deviation_map.iter().map(|height| f64::from(*height) > limit).collect();
     let grid = cut.grid;

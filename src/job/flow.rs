@@ -155,9 +155,9 @@ impl Session {
         let (cutters, holders) = self.tools(request);
         let path = &planned.plan.path;
         let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
-        // The programs are as far off the moves that were measured.
-        let strays = whole.path.origin.strays;
-        measured.measurement.widen(strays);
+        // The programs are as far off the moves that were measured, and the files' surfaces off the meshes.
+        let off = whole.path.origin.strays + self.moved();
+        measured.measurement.widen(off);
         let tools = ToolMoves::of(&cutters, &holders, path);
         let mut covered = match (covered, &self.pocket) {
             (Some(known), _) => known,
@@ -169,7 +169,7 @@ impl Session {
             }
         };
         if let Some(unseen) = &mut covered.unseen {
-            unseen.measurement.widen(strays);
+            unseen.measurement.widen(off);
         }
         let unseen = covered.unseen.iter_mut().map(|unseen| &mut unseen.measurement);
         for found in unseen.chain([&mut measured.measurement]) {

@@ -22,6 +22,8 @@ mod pocket;
 mod run;
 mod session;
 mod tool;
+#[cfg(test)]
+mod torn_mesh_tests;
 mod units;
 
 pub use error::JobError;

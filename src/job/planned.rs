@@ -262,7 +262,7 @@ impl Session {
     }
 
     /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool
-    /// astray, or arcs an upright one.
+    /// astray, or arcs an upright one, and by what meshes are off their files.
     pub(crate) fn aimed_at(&self, request: &ToolpathRequest) -> Step {
         let strays = if request.tilts() {
             may_stray(&self.scene, &Tool::of(&request.tooling))
@@ -270,7 +270,7 @@ impl Session {
             self.scene.arcs.unwrap_or(0.0)
         };
         match request.step {
-            Step::Scallop(height) => Step::Scallop((height - strays).max(LEAST_AIM * height)),
+            Step::Scallop(height) => Step::Scallop((height - strays - self.moved()).max(LEAST_AIM * height)),
             step => step,
         }
     }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use blade::Blade;
 use cutter::{Cutter, Holder};
 use field::ShortestPossible;
-use geometry::{Aabb, Bvh, Point3, Vector3};
+use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, LaidOut, Limits, Measured, Simulation, Task};
 use motion::{Cutters, Toolpath};
@@ -219,6 +219,11 @@ impl Session {
     /// The box around the stock.
     pub fn area(&self) -> Aabb {
         self.stock.bounds()
+    }
+
+    /// How far welding moved the surfaces of part and stock off their files at most, mm.
+    pub(crate) fn moved(&self) -> f64 {
+        self.part.mesh().moved() + self.stock.mesh().map_or(0.0, TriangleMesh::moved)
     }
 
     /// The meshes that are not to be touched.

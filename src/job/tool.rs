@@ -67,7 +67,7 @@ impl Tool {
         let solids = || std::iter::once(&self.cutter).chain(&self.holder);
         let of_one = |(mesh, bvh): &'a FixtureMesh| {
             let obstacle = Obstacle::new(mesh, bvh);
-            let needed = scene.keep_clear.clearance + may_stray(scene, self) + WRITTEN;
+            let needed = scene.keep_clear.clearance + mesh.moved() + may_stray(scene, self) + WRITTEN;
             solids().map(move |solid| Check { solid, obstacle, needed })
         };
         Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }

@@ -115,7 +115,8 @@ impl Part {
         self.bounds
     }
 
-    /// Bound of the distance between [`Part::mesh`] and the exact surface, mm; 0 for a mesh part.
+    /// Bound of the distance between [`Part::mesh`] and the exact surface, mm; for a mesh part what welding moved it
+    /// by, mostly 0.
     pub fn mesh_deviation(&self) -> f64 {
         self.deviation
     }

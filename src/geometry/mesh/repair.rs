@@ -1,8 +1,9 @@
-//! The way from a soup of triangles to a [`TriangleMesh`]: check, merge, drop, pair up, orient.
+//! The way from a soup of triangles to a [`TriangleMesh`]: check, merge, drop, weld, pair up, orient.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
+use super::weld::weld;
 use super::{Junctions, MeshError, NONE, Outside, RepairNotes, TriangleMesh};
 use crate::{Aabb, MAX_COORDINATE, Point3, Vector3};
 
@@ -30,6 +31,7 @@ pub(super) fn repair(
     triangles: Vec<[u32; 3]>,
     outside: Outside,
     junctions: Junctions,
+    tolerance: f64,
 ) -> Result<Repaired, MeshError> {
     check(&vertices, &triangles)?;
     let mut notes = RepairNotes::default();
@@ -56,6 +58,9 @@ pub(super) fn repair(
         notes.dropped_duplicates = before - soup.faces.len();
         sides = Sides::of(vertices.len(), &soup.faces);
     }
+    if tolerance > 0.0 && weld(&vertices, &mut soup, &sides, tolerance, &mut notes) {
+        sides = Sides::of(vertices.len(), &soup.faces);
+    }
     let mut opened = Opened { junctions, edges: 0, first: None };
     let (mut neighbours, consistent) = sides.pair_up(&vertices, &soup, &mut opened)?;
     drop(sides);
@@ -74,7 +79,8 @@ pub(super) fn repair(
     let vertices = drop_unused(vertices, &mut soup.faces);
     let bounds = Aabb::of(&vertices);
     let junction = opened.first.map(Box::new);
-    let mesh = TriangleMesh { vertices, triangles: soup.faces, neighbours, bounds, junction };
+    let moved = notes.moved;
+    let mesh = TriangleMesh { vertices, triangles: soup.faces, neighbours, bounds, junction, moved };
     Ok((mesh, notes, soup.sources))
 }
 
@@ -99,17 +105,17 @@ impl Opened {
 
 /// Triangles on their way through the repair.
 #[derive(Default)]
-struct Soup {
+pub(super) struct Soup {
     /// Corners, as indices of merged vertices.
-    faces: Vec<[u32; 3]>,
+    pub faces: Vec<[u32; 3]>,
     /// Corners, as indices of the vertices given.
-    sources: Vec<[u32; 3]>,
+    pub sources: Vec<[u32; 3]>,
     /// Place among the triangles given.
-    origin: Vec<u32>,
+    pub origin: Vec<u32>,
 }
 
 impl Soup {
-    fn push(&mut self, face: [u32; 3], source: [u32; 3], origin: usize) {
+    pub fn push(&mut self, face: [u32; 3], source: [u32; 3], origin: usize) {
         self.faces.push(face);
         self.sources.push(source);
         self.origin.push(origin as u32);
@@ -162,7 +168,7 @@ fn check(vertices: &[Point3], triangles: &[[u32; 3]]) -> Result<(), MeshError> {
 /// Hashes three coordinates in a few operations. The standard hasher takes longer than all the
 /// rest of the repair; it guards against chosen collisions, which here only cost their author time.
 #[derive(Default)]
-struct CoordinateHasher(u64);
+pub(super) struct CoordinateHasher(u64);
 
 impl Hasher for CoordinateHasher {
     fn finish(&self) -> u64 {
@@ -179,9 +185,9 @@ impl Hasher for CoordinateHasher {
     }
 }
 
-/// The coordinates as a key; −0 counts as 0.
+/// Three numbers as a key: of coordinates their bits, where −0 counts as 0.
 #[derive(PartialEq, Eq)]
-struct Key([u64; 3]);
+pub(super) struct Key(pub [u64; 3]);
 
 impl Key {
     fn of(p: &Point3) -> Self {
@@ -217,7 +223,7 @@ fn merge(vertices: &[Point3], triangles: &[[u32; 3]], notes: &mut RepairNotes) -
     (merged, new_index)
 }
 
-fn has_area([a, b, c]: [Point3; 3]) -> bool {
+pub(super) fn has_area([a, b, c]: [Point3; 3]) -> bool {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let longest = ab.norm_squared().max(bc.norm_squared()).max(ca.norm_squared());
     // The cross product at the corner opposite the longest side loses least to rounding.
@@ -233,24 +239,24 @@ fn has_area([a, b, c]: [Point3; 3]) -> bool {
 
 /// One side of one triangle, filed under the lower of its two vertices.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+pub(super) struct Side {
     /// The higher of its two vertices.
-    other: u32,
+    pub other: u32,
     /// The triangle's third corner.
-    opposite: u32,
+    pub opposite: u32,
     /// 3 × triangle + side.
-    slot: u32,
+    pub slot: u32,
 }
 
 /// All sides, sorted by edge.
-struct Sides {
+pub(super) struct Sides {
     sides: Vec<Side>,
     /// Sides of lower vertex `v`: `starts[v]..starts[v + 1]`.
     starts: Vec<u32>,
 }
 
 impl Sides {
-    fn of(vertices: usize, faces: &[[u32; 3]]) -> Self {
+    pub fn of(vertices: usize, faces: &[[u32; 3]]) -> Self {
         let ends = |face: &[u32; 3], k: usize| (face[k], face[(k + 1) % 3], face[(k + 2) % 3]);
         let mut starts = vec![0u32; vertices + 1];
         for face in faces {
@@ -279,11 +285,18 @@ impl Sides {
     }
 
     /// The sides at each edge, with the edge's lower vertex.
-    fn edges(&self) -> impl Iterator<Item = (u32, &[Side])> {
+    pub fn edges(&self) -> impl Iterator<Item = (u32, &[Side])> {
         (0..self.starts.len() - 1).flat_map(|v| {
             let here = &self.sides[self.starts[v] as usize..self.starts[v + 1] as usize];
             here.chunk_by(|a, b| a.other == b.other).map(move |edge| (v as u32, edge))
         })
+    }
+
+    /// How many sides an edge has, named by its lower vertex and its higher one.
+    pub fn count(&self, [low, high]: [u32; 2]) -> usize {
+        let here = &self.sides[self.starts[low as usize] as usize..self.starts[low as usize + 1] as usize];
+        let [first, end] = [high, high + 1].map(|v| here.partition_point(|side| side.other < v));
+        end - first
     }
 
     /// Marks triangles whose three corners are those of an earlier one; `None` without any.

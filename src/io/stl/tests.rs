@@ -183,3 +183,27 @@ proptest! {
         holds_up(parse, &binary_of(b"", &corners));
     }
 }
+
+/// Corners that differ by a step of f32, as modellers round them, and one that lies on the edge of a neighbour.
+#[test]
+fn what_rounding_tore_apart_is_whole_again() {
+    let mut torn = TETRAHEDRON.map(|t| t.map(|p| p.map(|x| 1000.0 + 30.0 * x)));
+    // The last face in two, at the middle of an edge.
+    let middle = [1015.0, 1015.0, 1000.0];
+    let [a, b, c] = torn[3];
+    torn[3] = [a, middle, c];
+    let mut torn = [&torn[..], &[[middle, b, c]]].concat();
+    for (k, x) in torn.iter_mut().flatten().flatten().enumerate() {
+        if k % 3 == 0 || k % 5 == 0 {
+            *x = x.next_up();
+        }
+    }
+    for bytes in [binary_of(b"binary", &torn), text_of(&torn).into_bytes()] {
+        assert!(!corners(&bytes).unwrap().mesh(0.0).unwrap().0.is_closed());
+        let (mesh, notes) = parse(&bytes).unwrap();
+        assert!(mesh.is_closed() && mesh.triangles().len() == 6, "{notes}");
+        assert_eq!((mesh.vertices().len(), notes.split_edges), (5, 1), "{notes}");
+        // A step is 2⁻¹⁴ mm.
+        assert!(notes.moved > 0.0 && notes.moved < 4e-4, "{notes}");
+    }
+}

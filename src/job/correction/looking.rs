@@ -45,9 +45,9 @@ impl Looked {
 
 impl Session {
     /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to
-    /// leave it as well, with what arcs may lead the tool astray.
+    /// leave it as well, with what arcs may lead the tool astray, and what meshes are off their files.
     pub(super) fn room(&self, request: &ToolpathRequest) -> f64 {
-        let (tolerance, strays) = (&self.scene.tolerance, self.scene.arcs.unwrap_or(0.0));
+        let (tolerance, strays) = (&self.scene.tolerance, self.scene.arcs.unwrap_or(0.0) + self.moved());
         let (chord, is_smoothed) = (tolerance.chord, request.joining.smoothing);
         let unused = unused_tolerance(chord, is_smoothed);
         unused.min(tolerance.gouge - (chord - unused) - strays)

@@ -172,9 +172,9 @@ fn with_meshes(
     let files = run.scene().keep_clear.fixtures.iter().map(|fixture| &fixture.file.written);
     for ((mesh, bvh), file) in run.around.fixtures.iter().zip(files) {
         let fixture = Obstacle::new(mesh, bvh);
-        add(("cutter", file.clone()), &tool.cutter, fixture, 0.0)?;
+        add(("cutter", file.clone()), &tool.cutter, fixture, mesh.moved())?;
         if let Some(holder) = &tool.holder {
-            add(("holder", file.clone()), holder, fixture, 0.0)?;
+            add(("holder", file.clone()), holder, fixture, mesh.moved())?;
         }
     }
     let (part, off) = (Obstacle::new(near.mesh(), near.bvh()), near.mesh_deviation());
@@ -241,15 +241,16 @@ fn with_standing_stock(
     };
     // An upright section no wider than the cutter stands where it has been.
     let Some(found) = found else { return Ok(None) };
-    let astray = strays(&tool.path, &Solid::of_cutter(tool.cutter, Some(holder)), &Solid::of_holder(holder));
+    let off = run.session.moved()
+        + strays(&tool.path, &Solid::of_cutter(tool.cutter, Some(holder)), &Solid::of_holder(holder));
     let more = more_moves(found.collisions.len());
     let tool_number = run.path().named_tool_of(tool.first as usize);
     let pair = PairClearance { more, tool_number, ..PairClearance::new(("holder", STANDING.into())) };
     Ok(Some(match found.nearest {
-        None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound + astray),
+        None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound + off),
         Some(near) => {
-            let pair = PairClearance { clearance_mm: Some(near.distance), off: astray, ..pair };
-            pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound + astray)
+            let pair = PairClearance { clearance_mm: Some(near.distance), off, ..pair };
+            pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound + off)
         }
     }))
 }

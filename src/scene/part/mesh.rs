@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-use geometry::{MeshError, TriangleMesh};
+use geometry::{MeshError, RepairNotes, TriangleMesh};
 use io::{MAX_MESH_FILE_BYTES, MeshFormat, MeshLimits, MeshReadError, mesh_extensions};
 use keys::{SceneError, Section, toml_string};
 use metrology::{BYTES_PER_TRIANGLE, MIB};
@@ -61,7 +61,7 @@ pub(crate) fn read_mesh(
     format: &MeshFormat,
     scale: f64,
 ) -> Result<(TriangleMesh, Vec<String>), SceneError> {
-    let limits = limits(job.memory_mib);
+    let limits = MeshLimits { weld: job.flattening / scale, ..limits(job.memory_mib) };
     let (mesh, repairs) = format.read_within(&file.path, &limits).map_err(|e| match e {
         MeshReadError::TooLarge { mib, .. } if limits.bytes < MAX_MESH_FILE_BYTES => {
             too_little_memory(job, file, mib)
@@ -72,6 +72,7 @@ pub(crate) fn read_mesh(
         other => job.refused(file, other),
     })?;
     let mesh = in_mm(mesh, scale).map_err(|e| job.refused(file, e))?;
+    let repairs = RepairNotes { moved: mesh.moved(), ..repairs };
     let notes = if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
     Ok((mesh, notes))
 }
@@ -79,7 +80,8 @@ pub(crate) fn read_mesh(
 /// What a mesh file may hold under a run's memory.
 fn limits(memory_mib: u32) -> MeshLimits {
     let memory = u64::from(memory_mib) * MIB;
-    MeshLimits { bytes: memory.min(MAX_MESH_FILE_BYTES), triangles: (memory / BYTES_PER_TRIANGLE) as usize }
+    let triangles = (memory / BYTES_PER_TRIANGLE) as usize;
+    MeshLimits { bytes: memory.min(MAX_MESH_FILE_BYTES), triangles, ..MeshLimits::default() }
 }
 
 fn too_little_memory(job: &Loading<'_>, file: &NamedFile, needed_mib: u64) -> SceneError {

@@ -191,9 +191,9 @@ fn on_workpiece<'a>(run: &Run<'a>, chain: &Chain) -> Vec<Other<'a>> {
     let from_link = Isometry3::from(-chain.workpiece_zero().coords);
     let near = run.around.near;
     let part = Obstacle::new(near.mesh(), near.bvh());
-    let fixtures = run.around.fixtures.iter().map(|(mesh, bvh)| Obstacle::new(mesh, bvh));
+    let fixtures = run.around.fixtures.iter().map(|(mesh, bvh)| (Obstacle::new(mesh, bvh), mesh.moved()));
     let files = run.session.scene.keep_clear.fixtures.iter().map(|fixture| fixture.file.written.clone());
-    let named = fixtures.zip(files).map(|(obstacle, name)| (name, obstacle, 0.0));
+    let named = fixtures.zip(files).map(|((obstacle, off), name)| (name, obstacle, off));
     let all = [("part".to_owned(), part, near.mesh_deviation())].into_iter().chain(named);
     all.map(|(name, obstacle, off)| Other { name, link, obstacle, off, from_link }).collect()
 }

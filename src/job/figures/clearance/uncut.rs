@@ -43,7 +43,7 @@ impl UncutStock {
                 Body::cylinder(*base, end, 2.0 * radius)?.mesh()?
             }
             _ => match stock.mesh() {
-                Some(mesh) => (mesh.clone(), 0.0),
+                Some(mesh) => (mesh.clone(), mesh.moved()),
                 None => Body::block(stock.bounds().min, stock.bounds().max)?.mesh()?,
             },
         };
