@@ -61,6 +61,10 @@ const MOST_MEASURED_NEAR: usize = 8;
 /// corrected is aimed at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
+/// Functions are gone on with where more than this share of the ridges stands above the target: halving intervals for
+/// them takes twice as many passes there.
+const MANY: f64 = 0.02;
+
 /// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where ridges are known
 /// less closely. With less, whole measurements are spent on a few per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
@@ -460,9 +464,15 @@ impl Corrected<'_> {
             lowered: widths.lowered.clone(),
             touch_up: widths.touch_up.clone(),
             kept: alike.unwrap_or(&self.tried).kept.clone(),
+            anew: alike.is_none() && self.stands_high_in_many_places(),
             again: alike.is_some() && self.request.axis.is_none(),
         };
         Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
+    }
+
+    /// Whether each plan so far leaves many ridges above the target.
+    fn stands_high_in_many_places(&self) -> bool {
+        self.rounds.iter().all(|round| round.over_target_fraction.is_some_and(|over| over > MANY))
     }
 
     /// Measures the best plan, where no cell sees as well unless the rest fails for certain.

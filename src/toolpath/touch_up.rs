@@ -236,13 +236,7 @@ mod tests {
         let tilting =
             Tilting { axis: &rule, most_turning: None, most_turning_across: None, interference: None };
         let planned = |strategy: &dyn Strategy, places: &[Point3]| {
-            let earlier = Earlier {
-                correction: Correction::default(),
-                lowered: Vec::new(),
-                touch_up: places.to_vec(),
-                kept: Arc::default(),
-                again: false,
-            };
+            let earlier = Earlier { touch_up: places.to_vec(), ..Earlier::default() };
             let settings = PlanSettings {
                 step: Step::Stepover(4.0),
                 earlier: Some(Arc::new(earlier)),

@@ -180,7 +180,10 @@ impl Corrected<'_> {
         let lowered = lowered.unwrap_or_else(|| widths.clone());
         // Where a measurement finds others beside those that were served, there are more to come.
         let measured = self.rounds.iter().filter(|round| round.measured).count();
-        let was_served = measured > 1 && tried.standing.round.measured && !widths.touch_up.is_empty();
+        let was_served = measured > 1
+            && !self.is_near(tried)
+            && tried.standing.round.measured
+            && !widths.touch_up.is_empty();
         let is_served =
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
         // Along borders narrower widths may change nothing.

@@ -10,7 +10,7 @@ mod edges;
 
 use super::iso_scallop::{FrontStart, StartedFront};
 use super::mesh_front::{along_surface, best_on_piece, fronts_over, put_on_level};
-use super::mesh_shortest::shortest_streams;
+use super::mesh_shortest::{gone_on, shortest_streams};
 use super::shortest::{Objective, SEARCHED};
 use super::streamline::FITTED;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between, whole_pass};
@@ -149,6 +149,20 @@ fn on_piece(
             let values = along_lines(task, (&lines, &matters), weight, surface)?;
             let function = LevelFunction::Mesh(values.into());
             vec![Levelled { function, planned_as: FITTED.into(), told: None }]
+        }
+        (Aim::Shortest(None, objective), Some(levelled)) => {
+            let mut functions = vec![levelled.clone()];
+            if let LevelFunction::Mesh(values) = &levelled.function
+                && task.settings.earlier.is_some_and(|earlier| earlier.anew)
+            {
+                let found = gone_on(surface, task, values, objective)?;
+                let levelled = |values: Vec<f64>| Levelled {
+                    function: LevelFunction::Mesh(values.into()),
+                    ..levelled.clone()
+                };
+                functions.extend(found.map(levelled));
+            }
+            functions
         }
         (_, Some(levelled)) => vec![levelled.clone()],
         (Aim::Front(_), None) => best_on_piece(task, fronts, piece),

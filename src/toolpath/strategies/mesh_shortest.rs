@@ -57,10 +57,7 @@ pub(crate) fn shortest_streams(
 ) -> Result<Vec<Packed>, Cancelled> {
     let monitor = task.monitor;
     let slowed = |curvature: f64| task.pace.slowed(curvature, task.cutter.corner_radius());
-    let prices = match (objective, toward) {
-        (Objective::Time, None) => Prices { end: 0.5 * task.pace.link, turning: &slowed },
-        _ => Prices { end: 0.0, turning: &|_| 0.0 },
-    };
+    let prices = prices(task, if toward.is_none() { objective } else { Objective::Length }, &slowed);
     let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
     let gone_on_with = if coarser.is_some() { 2 * most } else { most };
     let all = STARTS + usize::from(further.is_some()) + gone_on_with;
@@ -95,6 +92,33 @@ pub(crate) fn shortest_streams(
         packed.coefficients = surface.continued(std::mem::take(&mut packed.coefficients));
     }
     Ok(found)
+}
+
+/// The function with the best path near one of an earlier plan, where intervals are those that were measured
+/// since; `None` where the surface does not determine one.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(crate) fn gone_on(
+    surface: &MeshSurface,
+    task: &Task<'_>,
+    from: &[f64],
+    objective: Objective,
+) -> Result<Option<Vec<f64>>, Cancelled> {
+    task.monitor.start("searching directions", 1);
+    let slowed = |curvature: f64| task.pace.slowed(curvature, task.cutter.corner_radius());
+    let search = Search::new(surface, task, None, prices(task, objective, &slowed));
+    let Some(minimiser) = search.minimiser() else { return Ok(None) };
+    let found = search.minima(&minimiser, vec![from.to_vec()], Rounds::Last, task.monitor)?;
+    Ok(found.into_iter().next().map(|packed| surface.continued(packed.coefficients)))
+}
+
+/// What ends and turns cost.
+fn prices<'a>(task: &Task<'_>, objective: Objective, slowed: &'a (dyn Fn(f64) -> f64 + Sync)) -> Prices<'a> {
+    match objective {
+        Objective::Time => Prices { end: 0.5 * task.pace.link, turning: slowed },
+        Objective::Length => Prices { end: 0.0, turning: &|_| 0.0 },
+    }
 }
 
 /// A surface as the minimiser sees it.

@@ -514,7 +514,7 @@ fn placed_knots(
 mod tests {
     use super::*;
     use crate::plan::{Plan, plan};
-    use crate::vocabulary::{Joining, Links, PlanSettings};
+    use crate::vocabulary::{Correction, Earlier, Joining, Links, PlanSettings};
     use field::LineSample;
     use field::mesh::Sense;
     use geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
@@ -675,6 +675,30 @@ mod tests {
         println!("{closed} of {} close, {length} {least} {:?}", passes.len(), plan.notes);
         assert!(closed == passes.len() && closed > 5, "{closed} of {}", passes.len());
         assert!(length > least && length < 1.1 * least, "{length} {least}");
+    }
+
+    /// Where many places were measured too high, the function goes on with narrower intervals there: halved ones
+    /// would take twice as many passes.
+    #[test]
+    fn where_many_places_are_narrower_the_function_is() {
+        let part = ring(0.0);
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = joined_on_the_surface(&part, 0.02);
+        let time = ShortestStreamline { toward: None, objective: Objective::Time };
+        let first = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
+        let high =
+            (0..400).map(|k| Point3::new(0.5 + 0.6 * f64::from(k % 20), 0.6 * f64::from(k / 20) - 6.0, 0.0));
+        let places: Vec<_> = high.map(|at| (at, 0.85)).collect();
+        let length = |anew: bool| {
+            let correction = Correction::new(&places, 0.7);
+            let earlier = Earlier { correction, kept: first.kept.clone(), anew, ..Earlier::default() };
+            let settings = PlanSettings { earlier: Some(Arc::new(earlier)), ..settings.clone() };
+            let plan = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
+            plan.kept.passes.iter().flat_map(|p| p.windows(2)).map(|w| (w[1] - w[0]).norm()).sum::<f64>()
+        };
+        let [halved, anew] = [false, true].map(length);
+        println!("{halved} {anew}");
+        assert!(anew < 0.97 * halved, "{anew} {halved}");
     }
 
     /// Passes around the hole of a bezel are taken where the search leads to others that take longer.

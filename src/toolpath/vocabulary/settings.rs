@@ -124,6 +124,8 @@ pub struct Earlier {
     pub touch_up: Vec<Point3>,
     /// What its strategy planned: levels of its functions are placed anew.
     pub kept: Arc<Kept>,
+    /// Whether functions that were searched may be gone on with by these factors: many places are narrower.
+    pub anew: bool,
     /// Whether its passes stay as they are: they were planned by the same factors, and only passes of their
     /// own are added.
     pub again: bool,
