@@ -176,10 +176,13 @@ impl Session {
             let own = OwnMoves { path, cutters: &cutters };
             gouge_moves::name(&mut found.gouge.regions, &whole, earlier, own);
         }
+        // Limits of jerk make it a search: it is told once.
+        let path_figures = planned.path_figures(&self.scene, monitor)?;
         let run = Run {
             session: self,
             request,
             planned: &planned,
+            machining_time_s: path_figures.machining_time_s,
             measured: &measured,
             covered: &covered,
             around,
@@ -203,7 +206,7 @@ impl Session {
             verdict: Verdict::by(&claims),
             claims,
             notes: self.notes_on(request, &planned, &measured, found.notes),
-            path: planned.path_figures(&self.scene, monitor)?,
+            path: path_figures,
             scallop: self.scallop_figures(request, measurement, unseen),
             gouge: unseen
                 .map_or_else(|| measurement.gouge.clone(), |unseen| measurement.gouge.or(&unseen.gouge)),

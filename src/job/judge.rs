@@ -14,7 +14,7 @@
 //! What else is limited is claimed by the figures of [`figures`](super::figures).
 
 use metrology::{Bounded, ExcessFigures, Limits, Measurement, ScallopRule};
-use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
+use report::{Claim, Gravity, MapMark, Verdict, beside_limit, micrometres, per_cent, place};
 use sim::NOT_CUT;
 
 /// The limits of a measured surface, each with its figure, its bound and a sentence: gouges, uncut material,
@@ -72,7 +72,7 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
     let figures = &measured.gouge;
     let mut text = format!(
         "gouge {} µm deep (limit {})",
-        with_bound(Some(figures.max_depth_mm), Some(figures.error_bound_mm)),
+        beside_limit(figures.max_depth_mm, figures.error_bound_mm, limits.gouge),
         micrometres(Some(limits.gouge))
     );
     if let Some(worst) = figures.regions.first() {
@@ -109,7 +109,7 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     let Bounded { max_mm: height, error_bound_mm: bound, .. } = all;
     let limit = micrometres(Some(limits.uncut));
     let mut text = if height > 0.0 {
-        format!("uncut material {} µm high (limit {limit})", with_bound(Some(height), Some(bound)))
+        format!("uncut material {} µm high (limit {limit})", beside_limit(height, bound, limits.uncut))
     } else {
         format!("no uncut material stands higher than {} µm (limit {limit})", micrometres(Some(bound)))
     };
@@ -162,7 +162,7 @@ fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim
     };
     let text = format!(
         "{what} is {} µm (limit {}){}{}",
-        with_bound(Some(all.max_mm), Some(all.error_bound_mm)),
+        beside_limit(all.max_mm, all.error_bound_mm, limit),
         micrometres(Some(limit)),
         all.at_mm.map_or(String::new(), |at| format!(" at {}", place(at))),
         for_certain(&all, limit)

@@ -21,6 +21,8 @@ pub(crate) struct Run<'a> {
     pub request: &'a ToolpathRequest,
     /// What was planned.
     pub planned: &'a Planned,
+    /// Time that the scene's machine takes for the path, s.
+    pub machining_time_s: f64,
     /// What was measured.
     pub measured: &'a Measured,
     /// What the measurement covers.

@@ -380,7 +380,7 @@ impl<'a> Section<'a> {
 
     /// `[from, to]` with `from < to`, which must be there.
     pub fn required_interval(&self, key: &str) -> Result<[f64; 2], SceneError> {
-        self.interval(key, COORDINATE, " mm")?.ok_or_else(|| self.missing(key, INTERVAL))
+        self.interval(key, COORDINATE, " mm")?.ok_or_else(|| self.missing(key, &format!("{USUAL:?}")))
     }
 
     /// `[from, to]` with `from < to` within `range`; `None` when the key is not there.
@@ -391,7 +391,8 @@ impl<'a> Section<'a> {
         unit: &str,
     ) -> Result<Option<[f64; 2]>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
-        let cure = format!("write two numbers, the lesser first, such as `{key} = {INTERVAL}`");
+        let [from, to] = [range.start().max(USUAL[0]), range.end().min(USUAL[1])];
+        let cure = format!("write two numbers, the lesser first, such as `{key} = [{from:.1}, {to:.1}]`");
         let DeValue::Array(list) = entry.get_ref() else {
             return Err(self.wrong_type(key, "a list of two numbers", entry, &cure));
         };
@@ -502,8 +503,8 @@ impl<'a> Section<'a> {
     }
 }
 
-/// An interval as messages show it.
-const INTERVAL: &str = "[0.0, 100.0]";
+/// An interval as messages show it, as far as a key allows.
+const USUAL: [f64; 2] = [0.0, 100.0];
 
 /// Lengths that make sense, mm: below a nanometre f64 geometry at a metre's distance is noise.
 pub const LENGTH: RangeInclusive<f64> = 1e-6..=1e4;

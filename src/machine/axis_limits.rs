@@ -80,7 +80,7 @@ pub(super) struct AxisLimits {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stage {
     /// The move that it belongs to.
-    step: usize,
+    pub step: usize,
     pub length: f64,
     pub slope: [f64; 5],
     /// At its beginning and at its end: d²q/ds².

@@ -36,5 +36,7 @@ pub use result::{
 };
 pub use stream_map::stream_picture;
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
-pub use table::{bound, capital, conclusion, duration, micrometres, per_cent, result_table, with_bound};
+pub use table::{
+    beside_limit, bound, capital, conclusion, duration, micrometres, per_cent, result_table, with_bound,
+};
 pub use verdict::{Claim, Gravity, Verdict, place};

@@ -52,6 +52,31 @@ pub fn with_bound(value: Option<f64>, error_bound: Option<f64>) -> String {
     }
 }
 
+/// The same of lengths in mm beside a limit: with the digits that show them to lie above it, where they do for
+/// certain.
+pub fn beside_limit(value: f64, error_bound: f64, limit: f64) -> String {
+    let um = [value, error_bound, limit].map(|length| length * 1000.0);
+    let shown = |[value, bound]: [&str; 2]| {
+        let number = |text: &str| text.parse::<f64>().unwrap_or(f64::NAN);
+        number(value) - number(bound) > um[2]
+    };
+    let usual = [micrometres(Some(value)), bound(error_bound)];
+    let finer = (1..MOST_DIGITS).map(|digits| {
+        let scale = 10f64.powi(digits as i32);
+        let up = (um[1] * scale - 1e-9).ceil().max(0.0) / scale;
+        [format!("{:.digits$}", um[0]), format!("{up:.digits$}")]
+    });
+    let above = um[0] - um[1] > um[2];
+    let [value, bound] = std::iter::once(usual.clone())
+        .chain(finer.filter(|_| above))
+        .find(|[value, bound]| !above || shown([value, bound]))
+        .unwrap_or(usual);
+    format!("{value} ± {bound}")
+}
+
+/// Digits behind the point of a micrometre, beyond which lengths are rounding.
+const MOST_DIGITS: usize = 7;
+
 /// A text with a capital letter at its beginning.
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
@@ -267,6 +292,19 @@ mod tests {
         assert_eq!(with_bound(Some(0.0194), Some(1e-9)), "19.4 ± 0.01");
         assert_eq!(with_bound(Some(0.0194), Some(0.01234)), "19.4 ± 12.4");
         assert_eq!(with_bound(Some(0.0), Some(0.0)), "0.00 ± 0.00");
+    }
+
+    /// Where rounding would hide that a limit is exceeded, more digits are shown.
+    #[test]
+    fn what_exceeds_a_limit_is_seen_to() {
+        assert_eq!(beside_limit(0.010_003_1, 0.000_001, 0.01), "10.003 ± 0.001");
+        assert_eq!(beside_limit(0.010_000_31, 0.000_000_1, 0.01), "10.0003 ± 0.0001");
+        assert_eq!(beside_limit(0.010_03, 0.000_01, 0.01), "10.03 ± 0.01");
+        assert_eq!(beside_limit(0.0194, 0.000_01, 0.01), "19.4 ± 0.01");
+        // Nothing is shown that is not known.
+        assert_eq!(beside_limit(0.010_03, 0.000_04, 0.01), "10.0 ± 0.04");
+        assert_eq!(beside_limit(0.0099, 0.000_01, 0.01), "9.90 ± 0.01");
+        assert_eq!(beside_limit(0.01, f64::INFINITY, 0.01), with_bound(Some(0.01), Some(f64::INFINITY)));
     }
 
     /// Names of a comparison differ in what stands last.

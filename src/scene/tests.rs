@@ -328,8 +328,14 @@ fn numbers_out_of_range_are_refused_where_they_stand() {
     let (message, ..) = refused(&with("direction = { angle = 12.5 }", "control_points = 4.5"));
     assert_eq!(message, "`control_points` in [[toolpath]] number 4 is 4.5; expected a whole number");
     for slope in ["[45, 45]", "[60, 30]", "[-1, 45]", "[0, 91]", "[0]", "45"] {
-        let (message, ..) = refused(&with("stepover = 0.3", &format!("stepover = 0.3\nslope = {slope}")));
+        let (message, cure, _) =
+            refused(&with("stepover = 0.3", &format!("stepover = 0.3\nslope = {slope}")));
         assert!(message.starts_with("`slope` in "), "{message}");
+        // What is told as an example is taken.
+        if let Some((_, example)) = cure.split_once("such as `") {
+            let text = with("stepover = 0.3", &format!("stepover = 0.3\n{}", example.trim_end_matches('`')));
+            assert!(Scene::parse("folder/wave.toml", &text).is_ok(), "{cure}");
+        }
     }
     let leaning = "stepover = 0.3\nslope = [0, 45]\naxis = \"normal\"";
     assert_eq!(refused(&with("stepover = 0.3", leaning)).0, "`slope` does not apply beside `axis`");

@@ -176,10 +176,11 @@ mod tests {
     use super::*;
     use crate::plan;
     use crate::vocabulary::{PlanSettings, Step, Strategy};
-    use crate::{LevelSteps, Plan, Waterline, Zigzag};
+    use crate::{LevelSteps, Objective, Plan, ShortestStreamline, Waterline, Zigzag};
     use geometry::TriangleMesh;
     use motion::MoveKind;
     use std::f64::consts::FRAC_PI_4;
+    use std::sync::Arc;
     use work::monitor::Silent;
 
     const HALF: f64 = 4.0;
@@ -250,6 +251,47 @@ mod tests {
             assert_eq!(walls.path, all.path);
             assert!(planned(&cutter, &Waterline { steps: LevelSteps::Shortest }, [0.0, 45.0]).is_err());
         }
+    }
+
+    /// Two tops apart from each other: each is told of with its own place.
+    #[test]
+    fn remarks_on_pieces_of_a_mesh_name_them() {
+        let mut points = Vec::new();
+        for x in [0.0, 40.0] {
+            points.extend(
+                [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]].map(|[u, v]| Point3::new(x + u, v, 0.0)),
+            );
+        }
+        let mesh = TriangleMesh::new(points, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).unwrap().0;
+        let strategy = ShortestStreamline { toward: None, objective: Objective::Length };
+        let settings = PlanSettings { step: Step::Scallop(0.05), ..PlanSettings::default() };
+        let part = Part::from_mesh(mesh);
+        let found = plan(&part, &Cutter::ball(6.0).unwrap(), &strategy, &settings, &Silent).unwrap();
+        for place in ["x 0.0 to 10.0 y 0.0 to 10.0", "x 40.0 to 50.0 y 0.0 to 10.0"] {
+            let told = format!(
+                "on the surface at {place}: passes follow the stream function of the shortest path: "
+            );
+            let of_it = found.notes.iter().filter(|note| note.starts_with(&told));
+            assert_eq!(of_it.count(), 1, "{:?}", found.notes);
+        }
+    }
+
+    /// A boundary beside the part.
+    #[test]
+    fn an_empty_program_is_told_by_its_boundary() {
+        let corners = [[50.0, 50.0], [60.0, 50.0], [60.0, 60.0]].map(|[x, y]| Point2::new(x, y));
+        let (boundary, _) = Region::nested(vec![corners.to_vec()]).unwrap();
+        let places = Places { boundary: Some(Arc::new(boundary)), rest: None };
+        let settings = PlanSettings {
+            step: Step::Scallop(0.02),
+            stock_top: TOP + 1.0,
+            places,
+            ..PlanSettings::default()
+        };
+        let found =
+            plan(&block(), &Cutter::ball(4.0).unwrap(), &Zigzag::at(0.0), &settings, &Silent).unwrap();
+        let told = "no pass reaches the part within `boundary`: the program is empty";
+        assert!(found.path.is_empty() && found.notes.iter().any(|note| note == told), "{:?}", found.notes);
     }
 
     #[test]

@@ -50,16 +50,17 @@ impl Plan {
 
     /// A path of what its strategy planned.
     pub(crate) fn new(path: Toolpath, kept: Kept) -> Self {
-        Self::again(path, Arc::new(kept), Vec::new())
+        Self::again(path, Arc::new(kept), Vec::new(), "")
     }
 
-    fn again(path: Toolpath, kept: Arc<Kept>, further: Vec<String>) -> Self {
+    /// With remarks besides, and words for where alone passes were asked for.
+    fn again(path: Toolpath, kept: Arc<Kept>, further: Vec<String>, within: &str) -> Self {
         let mut notes = kept.notes.clone();
         let further_says = !further.is_empty();
         notes.extend(further);
         if path.is_empty() {
-            let why = if further_says { "" } else { "no pass reaches the part: " };
-            notes.push(format!("{why}the program is empty"));
+            let why = format!("no pass reaches the part{within}: ");
+            notes.push(format!("{}the program is empty", if further_says { "" } else { &why }));
         }
         Self { path, notes, field: kept.field.clone(), kept, too_near_between: 0.0 }
     }
@@ -174,7 +175,8 @@ fn plan_on(
     let all = kept.passes.iter().cloned().chain(added).collect();
     let all = deeper(all, cutter, settings);
     let path = join(by_levels(all, &setup)?, strategy.both_ways(), &setup)?;
-    Ok(Plan::again(path, kept, further))
+    let within = settings.places.boundary.as_ref().map_or("", |_| " within `boundary`");
+    Ok(Plan::again(path, kept, further, within))
 }
 
 /// Passes as they are cut one layer after the other.

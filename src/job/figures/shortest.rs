@@ -100,7 +100,7 @@ fn least_links(path: &Toolpath, clearance: f64) -> f64 {
 }
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let (scene, planned) = (run.scene(), run.planned);
+    let scene = run.scene();
     // Tools that lean take other strips, a path for some places covers a part of the whole, one by levels covers
     // it more than once, and nobody planned a program from elsewhere for a scallop height.
     let request = run.request;
@@ -118,7 +118,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         Err(_) => return Ok(Finding::default()),
         Ok(shortest) => shortest,
     };
-    let time = planned.time(scene, monitor)?;
+    let time = run.machining_time_s;
     let (path, feed) = (run.path(), request.tooling.cutting.feed_rate);
     let links = least_links(path, scene.clearance);
     let shortest = ShortestFigures::new(&shortest, path, feed, time, links);

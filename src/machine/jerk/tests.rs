@@ -110,3 +110,94 @@ fn a_search_can_be_stopped() {
     let own = Machine { jerks: [5e4, 4e4, 3e4], ..FREE };
     assert_eq!(machining_time(&path(walk(1.0, 20)), &own, &Stop), Err(Cancelled));
 }
+
+/// Slow speeds on a path of a random walk, and its limits.
+fn slow_section(moves: u32) -> (Limits, Vec<f64>) {
+    let mut rng = sim::scenes::Rng::new(3);
+    let mut stage = |k: u32| Stage {
+        step: k as usize,
+        length: rng.within(0.1, 0.3),
+        slope: [rng.within(-1.0, 1.0), rng.within(-1.0, 1.0), 0.0, 0.0, 0.0],
+        bends: std::array::from_fn(|_| [rng.within(-0.2, 0.2), 0.0, 0.0, 0.0, 0.0]),
+        most: 500.0,
+        along: 1000.0,
+        jerk: true,
+    };
+    let stages: Vec<Stage> = (0..moves).map(&mut stage).collect();
+    let free = [f64::INFINITY; 5];
+    let axes = AxisLimits {
+        rates: free,
+        accelerations: std::array::from_fn(|k| if k < 2 { 900.0 } else { free[0] }),
+        jerks: std::array::from_fn(|k| if k < 2 { 3e4 } else { free[0] }),
+    };
+    let mut speeds: Vec<f64> = (0..=moves).map(|_| rng.within(0.9, 1.1)).collect();
+    (speeds[0], speeds[moves as usize]) = (0.0, 0.0);
+    let limits = Limits::new(&stages, &axes, &speeds);
+    let speeds = limits.section(false).inside(&speeds);
+    (limits, speeds)
+}
+
+/// Whether the times by which jerk is told are fixed or their own.
+#[test]
+fn derivatives_of_the_barrier_are_those_of_its_values() {
+    let (limits, x) = slow_section(12);
+    for section in [true, false].map(|fixed| limits.section(fixed)) {
+        let weight = 1e-3;
+        let here = section.barrier(&x, weight).unwrap();
+        assert_relative_eq!(here.value, section.value(&x, weight).unwrap(), max_relative = 1e-12);
+        for k in 1..12 {
+            let step = 1e-4 * x[k];
+            let [ahead, behind] = [step, -step].map(|step| {
+                let mut there = x.clone();
+                there[k] += step;
+                section.barrier(&there, weight).unwrap()
+            });
+            let slope = (ahead.value - behind.value) / (2.0 * step);
+            assert_relative_eq!(here.gradient[k], slope, max_relative = 1e-4, epsilon = 1e-6);
+        }
+    }
+}
+
+/// The Hessian is that of the convex problem, in which times do not hang on speeds.
+#[test]
+fn the_hessian_of_the_convex_barrier_is_that_of_its_gradients() {
+    let (limits, x) = slow_section(12);
+    let (section, weight) = (limits.section(true), 1e-3);
+    let here = section.barrier(&x, weight).unwrap();
+    for k in 1..12 {
+        let step = 1e-4 * x[k];
+        let [ahead, behind] = [step, -step].map(|step| {
+            let mut there = x.clone();
+            there[k] += step;
+            section.barrier(&there, weight).unwrap().gradient
+        });
+        for row in k..12 {
+            let slope = (ahead[row] - behind[row]) / (2.0 * step);
+            let got = if row - k < 3 { here.hessian[row][row - k] } else { 0.0 };
+            assert_relative_eq!(got, slope, max_relative = 1e-4, epsilon = 1e-6 * here.hessian[k][0]);
+        }
+    }
+}
+
+/// A part has all limits that hang on its free speeds: its barrier changes with them as that of the whole.
+#[test]
+fn the_barrier_of_a_part_changes_as_that_of_the_whole() {
+    let (limits, x) = slow_section(20);
+    for whole in [true, false].map(|fixed| limits.section(fixed)) {
+        for range in [0..20, 0..7, 5..11, 13..20] {
+            let (part, weight) = (whole.part(range.clone()), 1e-2);
+            assert!(!part.free().is_empty());
+            for k in part.free() {
+                let mut other = x.clone();
+                other[range.start + k] *= 1.01;
+                let change = |section: &Section<'_>, of: Range<usize>| {
+                    let [before, after] =
+                        [&x, &other].map(|x| section.value(&x[of.clone()], weight).unwrap());
+                    after - before
+                };
+                let [one, all] = [change(&part, range.start..range.end + 1), change(&whole, 0..21)];
+                assert_relative_eq!(one, all, max_relative = 1e-6, epsilon = 1e-12);
+            }
+        }
+    }
+}

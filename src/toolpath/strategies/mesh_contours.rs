@@ -72,9 +72,12 @@ pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, Pla
     let Reached { places, range, level, served } = guide.reached()?;
     let level = level / (level + served).max(f64::MIN_POSITIVE);
     if places.is_empty() {
-        let reason = "what the cutter reaches of it is level or upright, so that there are no contours; zigzag suits level ground, \
-                      and upright walls can be cut as those of a pocket";
-        return Err(refused(reason));
+        let all = settings.faces == Faces::ALL;
+        let of = if all { "it" } else { "the faces with the slopes asked for" };
+        return Err(refused(&format!(
+            "what the cutter reaches of {of} is level or upright, so that there are no contours; zigzag suits level ground, \
+             and upright walls can be cut as those of a pocket"
+        )));
     }
     let mut notes = Vec::new();
     let levels = place_levels(&places, range, placing, &mut notes);

@@ -29,7 +29,7 @@ use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
 use field::{DIRECTION_WEIGHT, Packed, ScalarField};
-use geometry::{Point2, Point3, Vector2, Vector3};
+use geometry::{Aabb, Point2, Point3, Vector2, Vector3};
 use part::Part;
 use scallop::{FeedCurvature, strip_width, strip_width_at, widest_strip_at};
 use work::monitor::{Cancelled, Monitor};
@@ -115,7 +115,14 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
             Aim::Front(_) => task.earlier_on_chart(k, count),
             _ => task.earlier_on_mesh(k, count),
         };
-        all.append(on_piece(task, (aim, &fronts), piece, &surface, earlier)?);
+        let mut passes = on_piece(task, (aim, &fronts), piece, &surface, earlier)?;
+        if count > 1 {
+            let at = Aabb::of(piece.mesh.points());
+            let [from, to] = [at.min, at.max];
+            let place = format!("x {:.1} to {:.1} y {:.1} to {:.1}", from.x, to.x, from.y, to.y);
+            passes.notes.iter_mut().for_each(|note| *note = format!("on the surface at {place}: {note}"));
+        }
+        all.append(passes);
     }
     Ok(all)
 }

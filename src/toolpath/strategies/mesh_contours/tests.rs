@@ -118,5 +118,19 @@ fn a_plate_has_no_contours() {
     let Err(PlanError::NotApplicable { strategy: "waterline", reason }) = refused else {
         panic!("{refused:?}")
     };
-    assert!(reason.contains("level or upright"), "{reason}");
+    assert!(reason.starts_with("what the cutter reaches of it is level or upright"), "{reason}");
+}
+
+/// A block that widens towards its foot has contours, but none on faces that are steeper.
+#[test]
+fn a_plate_may_have_contours_on_other_slopes() {
+    let part = blocks(30_f64.to_radians(), &[([0.0; 2], 8.0)]);
+    let faces = Faces::of_slopes([70_f64, 90.0].map(f64::to_radians));
+    let settings = PassSettings { faces, ..PassSettings::upright(Step::Stepover(0.5), 0.5) };
+    let pace = Pace { duration: &|passes, _| Ok(passes.length()), link: 1.0, bend: 0.1 };
+    let cutter = &cutters()[0];
+    let task = Task { part: &part, cutter, settings, wants_mesh: true, pace, monitor: &Silent };
+    let Err(PlanError::NotApplicable { reason, .. }) = passes(&task, LevelSteps::Constant) else { panic!() };
+    let told = "what the cutter reaches of the faces with the slopes asked for is level or upright";
+    assert!(reason.starts_with(told), "{reason}");
 }
