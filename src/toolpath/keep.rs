@@ -188,7 +188,12 @@ mod tests {
 
     /// A block without an underside whose walls lean by 7 degrees.
     fn block() -> Part {
-        let out = TOP * 7.0_f64.to_radians().tan();
+        leaning(7.0)
+    }
+
+    /// A block without an underside whose walls lean by so many degrees.
+    fn leaning(degrees: f64) -> Part {
+        let out = TOP * degrees.to_radians().tan();
         let ring = |half: f64, z: f64| {
             [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
                 .map(|[x, y]| Point3::new(x * half, y * half, z))
@@ -238,6 +243,25 @@ mod tests {
             let more = cut_ends(&all).len() as f64 / ends.len() as f64;
             assert!(more > 1.0, "{more}");
         }
+    }
+
+    /// A streamline over a top whose walls are not asked for is that of the top alone, to an interval beyond its
+    /// rim.
+    #[test]
+    fn streamlines_are_planned_for_the_faces_that_are_asked_for() {
+        let cutter = Cutter::ball(4.0).unwrap();
+        let strategy = ShortestStreamline { toward: None, objective: Objective::Length };
+        let length = |degrees: f64| {
+            let faces = Faces::of_slopes([0.0, 0.5]);
+            let step = Step::Scallop(0.02);
+            let settings = PlanSettings { step, stock_top: TOP + 1.0, faces, ..PlanSettings::default() };
+            let plan = plan(&leaning(degrees), &cutter, &strategy, &settings, &Silent).unwrap();
+            plan.kept.passes.iter().flat_map(|p| p.windows(2)).map(|w| (w[1] - w[0]).norm()).sum::<f64>()
+        };
+        // Walls that lean by 7 degrees are no matter to streamlines, others are faces as any.
+        let [top, leaning] = [7.0, 45.0].map(length);
+        println!("{top} {leaning}");
+        assert!(leaning < 1.05 * top, "{leaning} {top}");
     }
 
     /// Contours follow the walls alone whatever is asked for: asked for those they stay as they are, beside

@@ -180,8 +180,8 @@ mod tests {
 
     use super::*;
     use crate::{
-        Along, Correction, Earlier, FrontStart, IsoScallop, Plan, PlanSettings, Step, Strategy, Tilting,
-        Zigzag, plan_tilted,
+        Along, Earlier, FrontStart, IsoScallop, Plan, PlanSettings, Step, Strategy, Tilting, Zigzag,
+        plan_tilted,
     };
     use cutter::Cutter;
     use geometry::{AnalyticShape, AnalyticSurface};

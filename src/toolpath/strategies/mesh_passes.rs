@@ -19,7 +19,9 @@ use crate::levels::spacing::place_levels;
 use crate::levels::{obedience, planned_field, spirals};
 use crate::surface::border::useful_overrun;
 use crate::surface::chart::axis_offset_over;
-use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, STEEPEST_COSINE, not_applicable, reachable};
+use crate::surface::mesh_surface::{
+    ConnectedPiece, MeshSurface, STEEPEST_COSINE, not_applicable, reachable_of,
+};
 use crate::surface::{asked, feed};
 use crate::vocabulary::{
     Contact, Faces, FeedDirection, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step,
@@ -94,7 +96,8 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     if let Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) = aim {
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
-    let reached = reachable(part, cutter)?;
+    // Passes end an interval beyond the faces that are asked for.
+    let reached = reachable_of(part, cutter, (settings.faces, flat))?;
     if reached.steep_area >= LEAST_TOLD {
         all.notes.push(format!(
             "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \

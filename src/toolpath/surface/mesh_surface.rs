@@ -5,9 +5,9 @@
 //! mesh both are fitted to the vertices of each smooth sheet. Heights of cutter locations come from
 //! dropping the cutter on the part itself, as always.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BinaryHeap, HashMap, HashSet};
 
-use crate::vocabulary::PlanError;
+use crate::vocabulary::{Faces, PlanError};
 use cutter::Cutter;
 use field::mesh::{Bend, Coarser, FieldMesh, MeshFieldError, Refined, Sheets, parted, weld};
 use geometry::{Aabb, Point3, Vector3};
@@ -153,6 +153,18 @@ pub(crate) fn fills_its_rectangle(part: &Part) -> bool {
 /// # Errors
 /// When the part's triangles do not make a surface, or nothing of it faces up.
 pub(crate) fn reachable(part: &Part, cutter: &Cutter) -> Result<Reachable, PlanError> {
+    reachable_of(part, cutter, (Faces::ALL, 0.0))
+}
+
+/// As [`reachable`], of some faces, and what goes on smoothly from them within a distance, mm.
+///
+/// # Errors
+/// As [`reachable`].
+pub(crate) fn reachable_of(
+    part: &Part,
+    cutter: &Cutter,
+    (faces, around): (Faces, f64),
+) -> Result<Reachable, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = part.mesh();
     let (points, triangles) = if part.patches().len() > 1 {
@@ -178,7 +190,7 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter) -> Result<Reachable, PlanE
     let creases = refined.creases(LEAST_HEIGHT_OVER_DEVIATION * part.mesh_deviation());
     let corner_normals = refined.corner_normals(&normals, &creases);
     let highest_above = COVERED_OVER_RADIUS * cutter.radius() + 2.0 * part.mesh_deviation();
-    let state = work::parallel::map(refined.triangles.len(), |t| {
+    let mut state = work::parallel::map(refined.triangles.len(), |t| {
         let [a, b, c] = refined.triangles[t].map(|i| refined.points[i as usize]);
         let normal = (b - a).cross(&(c - a));
         let centre = (a.coords + b.coords + c.coords) / 3.0;
@@ -193,6 +205,9 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter) -> Result<Reachable, PlanE
             _ => State::Open,
         }
     });
+    if faces != Faces::ALL {
+        leave_out(&refined, &faces, around, &mut state);
+    }
     own_normals(&refined, &state, &corner_normals, &mut normals);
     let sharp = between_open(&refined, &state, &creases);
     let steep_area = state.iter().map(|s| if let State::Steep(area) = s { *area } else { 0.0 }).sum();
@@ -248,7 +263,7 @@ fn own_normals(refined: &Refined, state: &[State], corner_normals: &[[Vector3; 3
         for (&v, normal) in corners.iter().zip(own) {
             match state {
                 State::Open => sums[v as usize] += normal * area,
-                State::Steep(_) | State::Below => meets[v as usize] = true,
+                State::Steep(_) | State::Below | State::Beside => meets[v as usize] = true,
             }
         }
     }
@@ -279,6 +294,52 @@ enum State {
     Open,
     Steep(f64),
     Below,
+    /// Beside the faces that are asked for.
+    Beside,
+}
+
+/// Leaves out what is none of the faces asked for, but for what goes on from them within a distance, mm, over
+/// no crease.
+fn leave_out(refined: &Refined, faces: &Faces, around: f64, state: &mut [State]) {
+    let corners = |t: usize| refined.triangles[t].map(|v| refined.points[v as usize]);
+    let middle = |t: usize| corners(t).iter().map(|p| p.coords).sum::<Vector3>() / 3.0;
+    let normal = |t: usize| {
+        let [a, b, c] = corners(t);
+        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+    };
+    let is_open = |state: &State| matches!(state, State::Open);
+    let mut at_edge: HashMap<[u32; 2], Vec<usize>> = HashMap::new();
+    for (t, corners) in refined.triangles.iter().enumerate().filter(|&(t, _)| is_open(&state[t])) {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            at_edge.entry([a.min(b), a.max(b)]).or_default().push(t);
+        }
+    }
+    let mut left: Vec<f64> = vec![f64::NEG_INFINITY; state.len()];
+    let mut open = BinaryHeap::new();
+    for t in (0..state.len()).filter(|&t| is_open(&state[t]) && faces.hold(&normal(t))) {
+        left[t] = around;
+        open.push((around.to_bits(), t));
+    }
+    // What is left of the distance is not negative, so that its bits are in its order.
+    while let Some((bits, t)) = open.pop() {
+        if f64::from_bits(bits) < left[t] {
+            continue;
+        }
+        let own = refined.triangles[t];
+        for k in 0..3 {
+            let (a, b) = (own[k], own[(k + 1) % 3]);
+            for &n in &at_edge[&[a.min(b), a.max(b)]] {
+                let remains = left[t] - (middle(n) - middle(t)).norm();
+                if remains > left[n].max(0.0) && normal(t).dot(&normal(n)) >= CREASE_COSINE {
+                    left[n] = remains;
+                    open.push((remains.to_bits(), n));
+                }
+            }
+        }
+    }
+    let beside = state.iter_mut().zip(left).filter(|(state, left)| is_open(state) && *left < 0.0);
+    beside.for_each(|(state, _)| *state = State::Beside);
 }
 
 /// Exact normals and curvature from the patches.
