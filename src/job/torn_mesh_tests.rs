@@ -81,7 +81,8 @@ fn torn_meshes_are_planned_as_whole_ones() {
 #[test]
 fn bounds_hold_what_welding_moved() {
     let (_, whole) = planned("near", &arch(0.0));
-    let round = |k: usize, x: f64| f64::from(if k % 5 == 0 { (x as f32).next_up() } else { x as f32 });
+    let round =
+        |k: usize, x: f64| f64::from(if k.is_multiple_of(5) { (x as f32).next_up() } else { x as f32 });
     let (session, torn) = planned("far", &changed(&arch(1000.0), round));
     let moved = session.moved();
     assert!(moved > 5e-5 && moved < 2e-4, "{moved}");
