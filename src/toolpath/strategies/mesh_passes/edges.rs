@@ -8,7 +8,8 @@
 
 use std::collections::HashMap;
 
-use super::{MeshGuide, Spot, width_at};
+use super::guide::{MeshGuide, Spot};
+use super::width_at;
 use crate::levels::halving::{Allowed, Track, along_stretches};
 use crate::levels::stretches::{Stretches, nearest_on};
 use crate::vocabulary::{Passes, PlanError};
