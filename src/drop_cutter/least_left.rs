@@ -84,7 +84,7 @@ impl DropCutter<'_> {
 
     /// What `cutter`, which this was made for, leaves above the place `at` from an axis, mm along z; `None`
     /// where it does not cover the place or touches no part.
-    fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2) -> Option<f64> {
+    pub fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2) -> Option<f64> {
         let height = cutter.height((axis - at.xy()).norm())?;
         Some(self.at(axis.x, axis.y)?.tip_z + height - at.z)
     }

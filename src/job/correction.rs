@@ -16,6 +16,7 @@
 //! show every pass. Then all is measured as the verdict is; what still stands above the target then is
 //! corrected as well.
 
+mod hollows;
 mod looking;
 mod next;
 mod round;
@@ -27,7 +28,7 @@ use std::sync::Arc;
 use metrology::{Engine, Measured, RidgeMap, Task};
 use scene::ToolpathRequest;
 use toolpath::{Earlier, Faces, Kept, Step, plane_interval};
-use work::monitor::{self, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 use super::covered::Covered;
 use super::earlier::EarlierPath;
@@ -36,6 +37,7 @@ use super::measuring::Closeness;
 use super::planned::Planned;
 use super::tool::Around;
 use super::{JobError, Session};
+use hollows::Hollows;
 pub(crate) use looking::Looked;
 use next::{EVENLY_HIGH, are_ends_alone, changes};
 pub(crate) use round::{CorrectionFigures, CorrectionRound};
@@ -74,9 +76,6 @@ const MEASURED_SLACK: f64 = 0.2;
 /// widths do not cut it either. They cut no less deep either where a plan cuts deeper by as many times than
 /// it may.
 const NEVER_CUT: f64 = 16.0;
-
-/// A plan that leaves no more than so many times what every path leaves is not made better.
-const NEAR_LEAST: f64 = 2.0;
 
 /// A plan that was tried.
 struct Tried {
@@ -125,10 +124,8 @@ struct Corrected<'a> {
     /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells
     /// show.
     is_complete: bool,
-    /// Whether every path of the cutter leaves more than the target somewhere.
-    is_hopeless: bool,
-    /// What every path of the cutter leaves somewhere, mm.
-    least_left: f64,
+    /// Where every path of the cutter leaves more than the target, if that is so somewhere.
+    hollows: Option<Hollows<'a>>,
 }
 
 impl Session {
@@ -192,7 +189,7 @@ impl Session {
             earlier,
             around,
             engine,
-            goal: Goal { target, rule: self.scene.scallop_rule },
+            goal: Goal { target, rule: self.scene.scallop_rule, is_hopeless: false },
             closeness,
             best: first,
             tried,
@@ -203,8 +200,7 @@ impl Session {
             kept: 0,
             made: Vec::new(),
             is_complete: false,
-            is_hopeless: false,
-            least_left: 0.0,
+            hollows: None,
         };
         corrected.remember_best();
         let looked = match looked {
@@ -217,12 +213,13 @@ impl Session {
         let looked = corrected.unless_touched_up_too_deep(looked, monitor)?;
         let Looked { measured, covered, .. } = corrected.by_measurements(looked, monitor)?;
         let Corrected { mut best, rounds, kept, .. } = corrected;
+        let rounds = rounds.iter().map(CorrectionRound::told).collect();
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
         Ok((best, measured, covered))
     }
 }
 
-impl Corrected<'_> {
+impl<'a> Corrected<'a> {
     fn wanted(&self, measured: bool) -> Wanted<'_> {
         let behind_others = measured && !self.earlier.is_empty();
         self.session.wanted(self.request, self.goal.target, behind_others)
@@ -231,9 +228,7 @@ impl Corrected<'_> {
     /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the
     /// `slack`.
     fn by_ridges(&mut self, mut slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
-        if self.is_too_hollow(monitor)? {
-            return Ok(());
-        }
+        self.seek_hollows_by_ridges(monitor)?;
         let mut in_vain = 0;
         while self.rounds.len() < MOST_ROUNDS
             && let Some(next) = self.next(in_vain, slack).filter(|_| !self.ends_in_vain(in_vain))
@@ -251,7 +246,8 @@ impl Corrected<'_> {
                 slack = map.as_ref().map_or(slack, |map| slack.max(slack_of(map)));
                 let found =
                     map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted(false)));
-                let Some(found) = found else { break };
+                let Some(mut found) = found else { break };
+                self.set_hollows_aside(&mut found, monitor)?;
                 let gain = found.round.gain_over(&self.tried.standing.round, &self.goal);
                 self.keep_if(gain, planned, next, found);
                 gain
@@ -273,7 +269,11 @@ impl Corrected<'_> {
         self.is_complete = true;
         let look = |task: &Task<'_>| self.engine.above(task, monitor);
         let others = self.session.on_coarse_cells(self.request, &self.best, look)?;
-        self.tried.standing.above.extend(others.iter().map(|place| (place.at, place.height)));
+        let mut others: Vec<_> = others.iter().map(|place| (place.at, place.height)).collect();
+        if let Some(hollows) = &mut self.hollows {
+            hollows.taken_from(&mut others, monitor)?;
+        }
+        self.tried.standing.above.extend(others);
         // The others are no reason to place all passes anew.
         Ok(self.next(1, slack).unwrap_or(next))
     }
@@ -300,10 +300,7 @@ impl Corrected<'_> {
         if looked.of_cells_alone && self.next(0, MEASURED_SLACK).is_some() {
             self.look_at_all_of_best(&mut looked, monitor)?;
         }
-        if self.is_unavoidable(&looked, monitor)? {
-            self.look_at_all_of_best(&mut looked, monitor)?;
-            return Ok(looked);
-        }
+        self.seek_hollows(&looked, monitor)?;
         let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
         for round in 0..MOST_MEASURED_NEAR {
             if round >= MOST_MEASURED && gain < Gain::Much && !self.is_near(&self.tried) {
@@ -332,6 +329,10 @@ impl Corrected<'_> {
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
+        if let Some(next) = self.along_creases(monitor)? {
+            drop(looked.take());
+            looked = self.unless_nothing_sinks(next, monitor)?;
+        }
         let mut looked = match looked {
             Some(looked) if looked.is_as_verdict => looked,
             other => {
@@ -346,7 +347,7 @@ impl Corrected<'_> {
     /// Measures a plan, and tells what it gains over the best one. While cells fail, what they do not see is
     /// measured of a plan only that is better but for it: with it no less stands.
     fn compared(
-        &self,
+        &mut self,
         planned: &Planned,
         factors: [f64; 2],
         is_passing: bool,
@@ -356,12 +357,16 @@ impl Corrected<'_> {
         let mut looked =
             session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
         let passes = [is_passing, session.passes(&looked)];
-        let standing = |looked: &Looked| Standing::of_all(looked, planned, factors, self.wanted(true));
-        let mut found = standing(&looked);
+        let standing = |of: &mut Self, looked: &Looked| {
+            let mut found = Standing::of_all(looked, planned, factors, of.wanted(true));
+            of.set_hollows_aside(&mut found, monitor)?;
+            Ok::<_, JobError>(found)
+        };
+        let mut found = standing(self, &looked)?;
         let mut gain = self.gain(&found, passes);
         if gain != Gain::None && looked.of_cells_alone {
             session.look_beside_cells(self.request, self.earlier, path, &mut looked, monitor)?;
-            found = standing(&looked);
+            found = standing(self, &looked)?;
             gain = self.gain(&found, passes);
         }
         Ok((looked, found, gain))
@@ -384,54 +389,105 @@ impl Corrected<'_> {
         }
     }
 
-    /// Whether every path of an upright cutter leaves more than the target somewhere, and the best plan not
-    /// much more: nearer passes would make the path longer without end.
-    fn is_too_hollow(&mut self, monitor: &dyn Monitor) -> Result<bool, JobError> {
-        let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    /// Seeks places where every path of an upright cutter leaves more than the target, where a ridge tells of them.
+    fn seek_hollows_by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
+        let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1)).copied();
         let limit = self.goal.rule.highest * self.goal.target;
         let is_alone = self.request.axis.is_none() && !self.request.stock_is_previous;
-        let Some((at, height)) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit)
-        else {
-            return Ok(false);
+        let Some(highest) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit) else {
+            return Ok(());
         };
-        let cutter = &self.request.tooling.cutter;
-        let place = Violated::near(&self.session.part, at, [*height, limit]);
-        let left = LeastLeftFigures::at_or_elsewhere(self.session, &[*cutter], &[place], monitor)?;
-        Ok(self.leaves_nearly(left))
+        let mut hollows = self.hollows_of_part(monitor)?;
+        let taken = hollows.taken_from(&mut self.tried.standing.above.clone(), monitor)?;
+        // Over a border the cutter comes lower, so that the highest place may be none.
+        let in_hollow = taken.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let near = |(at, height)| Violated::near(&self.session.part, &at, [height, limit]);
+        let places: Vec<Violated> = [Some(highest), in_hollow].into_iter().flatten().map(near).collect();
+        let cutter = self.request.tooling.cutter;
+        if LeastLeftFigures::at_or_elsewhere(self.session, &[cutter], &places, monitor)?.is_some() {
+            self.leave_hollows(hollows, monitor)?;
+        }
+        Ok(())
     }
 
-    /// Whether the best plan leaves what every path of the cutter leaves, behind what cut before it.
-    fn is_unavoidable(&mut self, looked: &Looked, monitor: &dyn Monitor) -> Result<bool, JobError> {
+    /// The same of what stands too high behind what cut before, where that was not done.
+    fn seek_hollows(&mut self, looked: &Looked, monitor: &dyn Monitor) -> Result<(), JobError> {
         let (session, path) = (self.session, &self.best.plan.path);
         // What this toolpath leaves to others is no reason to leave its own faces as they are.
         let is_for_all = self.best.plan.kept.faces == Faces::ALL
             && !session.rest_follows(self.request)
             && !self.request.is_for_places();
         let is_behind = self.request.stock_is_previous;
-        if self.tried.standing.round.holds(&self.goal) || is_behind && !is_for_all {
-            return Ok(false);
+        if self.hollows.is_some() || self.tried.standing.round.holds(&self.goal) || is_behind && !is_for_all {
+            return Ok(());
         }
         let with = (&[self.request.tooling.cutter][..], is_behind);
         let least = |violated| LeastLeftFigures::above_limit(session, with, path, violated, monitor);
         let left = least(Violated::of(session, &looked.measured.measurement))?;
         let unseen = looked.covered.as_ref().and_then(|covered| covered.unseen.as_ref());
-        let unseen = unseen.filter(|_| is_for_all).map(|unseen| Violated::unseen(session, unseen));
-        let at_foot = unseen.map_or(Ok(None), least)?;
-        self.is_hopeless |= at_foot.is_some();
-        self.least_left = left.iter().chain(&at_foot).map(|left| left.height_mm).fold(0.0, f64::max);
-        Ok(self.leaves_nearly(left))
+        let unseen = unseen.filter(|_| is_for_all && left.is_none());
+        let left = left.or(unseen.map_or(Ok(None), |unseen| least(Violated::unseen(session, unseen)))?);
+        if left.is_some() {
+            let hollows = self.hollows_of_part(monitor)?;
+            self.leave_hollows(hollows, monitor)?;
+        }
+        Ok(())
     }
 
-    /// Whether the best plan leaves little more than what every path does, if these leave too much.
-    fn leaves_nearly(&mut self, left: Option<LeastLeftFigures>) -> bool {
-        self.is_hopeless |= left.is_some();
-        left.is_some_and(|left| self.tried.standing.round.highest() <= NEAR_LEAST * left.height_mm)
+    /// The widths of the best plan with passes of their own along hollows.
+    fn along_creases(&mut self, monitor: &dyn Monitor) -> Result<Option<Widths>, JobError> {
+        let is_for_others = self.session.rest_follows(self.request) || self.request.axis.is_some();
+        let Some(hollows) = self.hollows.as_mut().filter(|_| !is_for_others) else { return Ok(None) };
+        let lines = hollows.creases(&self.tried.standing.in_hollows, monitor)?;
+        Ok((!lines.is_empty()).then(|| self.tried.widths.with_creases(lines)))
     }
 
-    /// Whether no other plan is made: none holds the target, and the last one was no better, or none can be.
+    /// Plans the best plan with further passes, and keeps that where something stands lower: nothing can rise.
+    fn unless_nothing_sinks(
+        &mut self,
+        next: Widths,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Looked>, JobError> {
+        let (planned, factors) = self.plan(&next, monitor)?;
+        let path = &planned.plan.path;
+        let mut looked =
+            self.session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+        self.session.look_beside_cells(self.request, self.earlier, path, &mut looked, monitor)?;
+        let found = Standing::of_all(&looked, &planned, factors, self.wanted(true));
+        let best = &self.tried.standing;
+        let sinks = self.cut_of(&found) <= self.cut_of(best)
+            && found.round.told().takes_something(&best.round.told(), &self.goal);
+        let gain = if sinks { Gain::Enough } else { Gain::None };
+        self.keep_if(gain, planned, next, found);
+        Ok(sinks.then_some(looked))
+    }
+
+    fn hollows_of_part(&self, monitor: &dyn Monitor) -> Result<Hollows<'a>, Cancelled> {
+        Hollows::of(&self.session.part, &self.request.tooling.cutter, self.goal.target, monitor)
+    }
+
+    /// From now on, what stands in hollows is no reason for another plan.
+    fn leave_hollows(&mut self, hollows: Hollows<'a>, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        (self.goal.is_hopeless, self.hollows) = (true, Some(hollows));
+        let mut standing = self.tried.standing.clone();
+        self.set_hollows_aside(&mut standing, monitor)?;
+        self.rounds[self.kept] = standing.round;
+        self.tried.standing = standing;
+        self.remember_best();
+        Ok(())
+    }
+
+    /// Leaves of what a plan leaves what another one may leave lower.
+    fn set_hollows_aside(&mut self, standing: &mut Standing, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        let target = self.goal.target;
+        self.hollows.as_mut().map_or(Ok(()), |hollows| standing.set_aside(hollows, target, monitor))
+    }
+
+    /// Whether no other plan is made: none holds the target, and the last one was no better, or nothing else
+    /// stands too high.
     fn ends_in_vain(&self, in_vain: usize) -> bool {
-        let round = &self.tried.standing.round;
-        self.is_hopeless && (in_vain > 0 || round.is_in_vain(self.least_left, &self.goal))
+        let limit = self.goal.rule.highest * self.goal.target;
+        self.hollows.is_some() && (in_vain > 0 || self.tried.standing.round.highest() <= limit)
     }
 
     /// Whether a plan stands above the target, but little.
@@ -463,6 +519,7 @@ impl Corrected<'_> {
             correction,
             lowered: widths.lowered.clone(),
             touch_up: widths.touch_up.clone(),
+            creases: widths.creases.clone(),
             kept: alike.unwrap_or(&self.tried).kept.clone(),
             anew: alike.is_none() && self.stands_high_in_many_places(),
             again: alike.is_some() && self.request.axis.is_none(),
@@ -479,7 +536,7 @@ impl Corrected<'_> {
     fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
         let path = &self.best.plan.path;
         let looked = self.session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
-        self.tell_of_best(&looked);
+        self.tell_of_best(&looked, monitor)?;
         Ok(looked)
     }
 
@@ -488,18 +545,20 @@ impl Corrected<'_> {
         if looked.of_cells_alone {
             let path = &self.best.plan.path;
             self.session.look_beside_cells(self.request, self.earlier, path, looked, monitor)?;
-            self.tell_of_best(looked);
+            self.tell_of_best(looked, monitor)?;
         }
         Ok(())
     }
 
     /// Puts what was measured of the best plan in place of what was known of it.
-    fn tell_of_best(&mut self, looked: &Looked) {
+    fn tell_of_best(&mut self, looked: &Looked, monitor: &dyn Monitor) -> Result<(), JobError> {
         let factors = self.tried.standing.round.factors;
-        let standing = Standing::of_all(looked, &self.best, factors, self.wanted(true));
+        let mut standing = Standing::of_all(looked, &self.best, factors, self.wanted(true));
+        self.set_hollows_aside(&mut standing, monitor)?;
         self.rounds[self.kept] = standing.round;
         self.tried.standing = standing;
         self.remember_best();
+        Ok(())
     }
 
     fn remember_best(&mut self) {

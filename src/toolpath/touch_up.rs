@@ -5,6 +5,8 @@
 //! through the places there, so that it runs along their ridge. What is cut once more can only sink; passes
 //! that are placed anew leave ridges at other places.
 
+use std::collections::VecDeque;
+
 use crate::link::plane_interval;
 use crate::vocabulary::{PlanError, Task};
 use drop_cutter::{Beside, DropCutter};
@@ -31,18 +33,19 @@ pub(crate) fn note(added: &[Vec<Point3>]) -> Option<String> {
     (count > 0).then(|| format!("{count} {passes} once more over places where others left too much"))
 }
 
-/// Passes over the places that an earlier plan left too high, beside those that are `planned`; the first
-/// places are served first. Places that a cutter from above does not touch are left out.
+/// Passes along creases, and over the places that an earlier plan left too high, beside those that are `planned`;
+/// the first places are served first. Places that a cutter from above does not touch are left out.
 ///
 /// # Errors
 /// When cancelled.
 pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec<Point3>>, PlanError> {
     let Task { part, ref settings, monitor, .. } = *task;
-    let places = settings.earlier.map_or(&[][..], |earlier| &earlier.touch_up);
+    let Some(earlier) = settings.earlier else { return Ok(Vec::new()) };
+    let (places, creases) = (&earlier.touch_up, &earlier.creases);
     let dropped = task.dropped();
     let interval = plane_interval(dropped, settings.step);
     let mut added = Vec::new();
-    if places.is_empty() || planned.is_empty() {
+    if places.is_empty() && creases.is_empty() || planned.is_empty() {
         return Ok(added);
     }
     let drop = DropCutter::watched(part, dropped, monitor)?;
@@ -54,8 +57,15 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
         let is_under = |tip_z: f64| settings.axis.is_none() || (tip_z - touching.z).abs() <= interval;
         drop.at(axis.x, axis.y).is_some_and(|drop| is_under(drop.tip_z)).then_some(axis)
     };
-    let mut waiting: Vec<Point2> = places.iter().filter_map(axis_over).collect();
-    while let Some((copy, [from, to])) = next_run(planned, &mut waiting, interval) {
+    let (alone, mut lines): (VecDeque<_>, VecDeque<_>) =
+        creases.iter().cloned().partition(|line| line.len() == 1);
+    let alone = alone.into_iter().flatten();
+    let mut waiting: Vec<Point2> = places.iter().filter_map(axis_over).chain(alone).collect();
+    let mut next = || {
+        let along = lines.pop_front().map(|line| Copied::of(line).whole());
+        along.or_else(|| next_run(planned, &mut waiting, interval))
+    };
+    while let Some((copy, [from, to])) = next() {
         monitor::check(monitor)?;
         let mut last = Beside::default();
         let mut tip = |s: f64| {
@@ -124,8 +134,18 @@ impl Copied {
         corners.reverse();
         corners.push(place);
         corners.extend(walk(&mut pass[k..].iter()));
+        Some(Self::of(corners))
+    }
+
+    fn of(corners: Vec<Point2>) -> Self {
         let lengths = CubicSpline::chord_lengths(&corners, false);
-        Some(Self { corners, lengths })
+        Self { corners, lengths }
+    }
+
+    /// All of it, as a run.
+    fn whole(self) -> (Self, [f64; 2]) {
+        let end = self.lengths[self.lengths.len() - 1];
+        (self, [0.0, end])
     }
 
     /// The place so many mm from the beginning.

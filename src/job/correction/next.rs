@@ -64,8 +64,8 @@ impl Corrected<'_> {
         let in_proportion = || {
             let round = &last.standing.round;
             // Few remnants along borders take passes of their own once the ridges hold.
-            let ridges_fail = round.highest_mm + round.margin(target) > target;
-            let height = if ridges_fail { round.highest_mm } else { round.highest() };
+            let ridges_fail = round.ridge() + round.margin(target) > target;
+            let height = if ridges_fail { round.ridge() } else { round.highest() };
             let may_help = height * MOST_NARROWED.powi(2) <= target && (ridges_fail || self.is_as_before());
             may_help.then(|| self.scaled(&last.widths, height))
         };
@@ -194,7 +194,7 @@ impl Corrected<'_> {
         }
         let round = &tried.standing.round;
         if self.is_near(tried) && !round.is_on_border() {
-            return Some(self.scaled(widths, round.highest_mm));
+            return Some(self.scaled(widths, round.ridge()));
         }
         Some(widths.narrowed(&high))
     }

@@ -38,6 +38,9 @@ pub(crate) struct CorrectionRound {
     /// How much nearer than asked the tool comes to anything between passes, mm; `None` where it keeps clear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub too_near_between_mm: Option<f64>,
+    /// The highest place that another plan may leave lower, mm. What is higher is left by every path.
+    #[serde(skip)]
+    pub avoidable_mm: f64,
     /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them. A plan
     /// that differs from the best one before by the ends of its passes only has the figures of that one, and so
     /// has one that comes out as an earlier one.
@@ -65,17 +68,34 @@ pub(super) struct Goal {
     pub target: f64,
     /// Which ridges may exceed it.
     pub rule: ScallopRule,
+    /// Whether every path of the cutter leaves more than the target somewhere.
+    pub is_hopeless: bool,
 }
 
 impl CorrectionRound {
-    /// What is highest, mm.
+    /// What is highest of all that another plan may leave lower, mm.
     pub fn highest(&self) -> f64 {
-        self.border_mm.map_or(self.highest_mm, |border| border.max(self.highest_mm))
+        self.border_mm.map_or(self.ridge(), |border| border.min(self.avoidable_mm).max(self.ridge()))
+    }
+
+    /// The highest ridge likewise, mm.
+    pub(super) fn ridge(&self) -> f64 {
+        self.highest_mm.min(self.avoidable_mm)
     }
 
     /// Whether a remnant along a border is higher than every ridge.
     pub fn is_on_border(&self) -> bool {
-        self.border_mm.is_some_and(|border| border > self.highest_mm)
+        self.highest() > self.ridge()
+    }
+
+    /// As it is told: with what every path leaves.
+    pub(super) fn told(&self) -> Self {
+        Self { avoidable_mm: f64::INFINITY, ..*self }
+    }
+
+    /// The bound of the highest, mm, where that is the highest of all.
+    fn bound(&self) -> Option<f64> {
+        self.error_bound_mm.filter(|_| self.highest() == self.told().highest())
     }
 
     /// Whether ridges exceed the target no more than they may.
@@ -88,13 +108,14 @@ impl CorrectionRound {
     /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined
     /// instead, as it is when all is measured.
     pub fn margin(&self, target: f64) -> f64 {
-        let bound = self.error_bound_mm.filter(|bound| self.measured && *bound <= SLACK * target);
+        let bound = self.bound().filter(|bound| self.measured && *bound <= SLACK * target);
         bound.unwrap_or(0.0)
     }
 
     /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what
     /// holds the target, then what is shorter; where neither holds it, the one with the lower ridge, unless that
-    /// takes little off and the other's is as high within its bound: then what is shorter as well.
+    /// takes little off and the other's is as high within its bound: then what is shorter as well. Where no path
+    /// holds it, the one that leaves fewer ridges above it.
     pub(super) fn is_better(&self, other: &Self, goal: &Goal) -> bool {
         let clear = [self, other].map(|round| round.too_near_between_mm.is_none());
         if clear[0] != clear[1] {
@@ -102,6 +123,9 @@ impl CorrectionRound {
         }
         match (self.holds(goal), other.holds(goal)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
+            (false, false) if goal.is_hopeless && self.over_target_fraction != other.over_target_fraction => {
+                self.over_target_fraction < other.over_target_fraction
+            }
             (false, false)
                 if self.cutting_length_mm != other.cutting_length_mm && self.is_as_high(other, goal) =>
             {
@@ -116,22 +140,26 @@ impl CorrectionRound {
     /// of the lower one, which takes no more off than a plan in vain.
     fn is_as_high(&self, other: &Self, goal: &Goal) -> bool {
         let (low, high) = if self.highest() < other.highest() { (self, other) } else { (other, self) };
-        let bound = low.error_bound_mm.filter(|_| low.measured && high.measured);
+        let bound = low.bound().filter(|_| low.measured && high.measured);
         bound.is_some_and(|bound| high.highest() - low.highest() <= bound)
             && !low.takes(LEAST_GAIN, high, goal)
     }
 
-    /// Whether no other plan gains anything over this one, where every one leaves so much, mm: no more than this
-    /// round's bound lies between them, nor than a plan in vain takes.
-    pub(super) fn is_in_vain(&self, left: f64, goal: &Goal) -> bool {
-        let most = LEAST_GAIN * (self.highest() - goal.target);
-        self.highest() - left <= self.error_bound_mm.unwrap_or(0.0).min(most)
-    }
-
     /// Whether this round takes a share of what another one leaves above the target.
     fn takes(&self, share: f64, other: &Self, goal: &Goal) -> bool {
-        let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
+        let above = |round: &Self| match round.over_target_fraction.filter(|_| goal.is_hopeless) {
+            Some(over) => over,
+            None => round.highest() + round.margin(goal.target) - goal.target,
+        };
         self.holds(goal) || above(self) <= (1.0 - share) * above(other)
+    }
+
+    /// Whether this round takes a share worth another plan of what another one leaves highest above the target, or
+    /// of the ridges that it leaves there.
+    pub(super) fn takes_something(&self, other: &Self, goal: &Goal) -> bool {
+        let fewer = Goal { is_hopeless: true, ..*goal };
+        let lower = Goal { is_hopeless: false, ..*goal };
+        [lower, fewer].iter().any(|goal| self.takes(LEAST_GAIN, other, goal))
     }
 
     /// What a plan gains over the best one before it.
@@ -173,10 +201,11 @@ mod tests {
             cutting_length_mm,
             factors: [1.0; 2],
             too_near_between_mm: None,
+            avoidable_mm: f64::INFINITY,
             measured: true,
             of_cells_alone: false,
         };
-        let strict = Goal { target: 1.0, rule: ScallopRule::default() };
+        let strict = Goal { target: 1.0, rule: ScallopRule::default(), is_hopeless: false };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, &strict);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
         assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));

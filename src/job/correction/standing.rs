@@ -7,7 +7,9 @@ use metrology::{Bounded, RidgeMap, path_figures};
 use motion::Toolpath;
 use part::Part;
 use toolpath::Faces;
+use work::monitor::{Cancelled, Monitor};
 
+use super::hollows::Hollows;
 use super::looking::Looked;
 use super::round::CorrectionRound;
 use super::{NEVER_CUT, SLACK};
@@ -21,6 +23,8 @@ pub(super) struct Standing {
     pub(super) round: CorrectionRound,
     /// Places near the target and above it with their heights, mm.
     pub(super) above: Vec<(Point3, f64)>,
+    /// Places above the target that nearer passes do not take lower, likewise.
+    pub(super) in_hollows: Vec<(Point3, f64)>,
     /// How deep it cuts below the design for certain, mm; 0 while only ridges are measured.
     pub(super) depth: f64,
     /// How high stands for certain what it does not reach, mm; 0 while only ridges are measured.
@@ -47,6 +51,7 @@ impl Standing {
             cutting_length_mm: cutting_length(planned),
             factors,
             too_near_between_mm: too_near(planned),
+            avoidable_mm: f64::INFINITY,
             measured: false,
             of_cells_alone: false,
         };
@@ -54,7 +59,8 @@ impl Standing {
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
         let above = places.chain(highest).collect();
-        let standing = Self { round, above, depth: 0.0, unreached: 0.0, is_never_cut: false };
+        let standing =
+            Self { round, above, in_hollows: Vec::new(), depth: 0.0, unreached: 0.0, is_never_cut: false };
         Some(standing.served(&planned.plan.kept.faces, wanted))
     }
 
@@ -76,6 +82,7 @@ impl Standing {
             cutting_length_mm: cutting_length(planned),
             factors,
             too_near_between_mm: too_near(planned),
+            avoidable_mm: f64::INFINITY,
             measured: true,
             of_cells_alone: looked.of_cells_alone,
         };
@@ -89,7 +96,8 @@ impl Standing {
         let of_unseen = unseen.map_or(0.0, |unseen| unseen.excess.unreached.at_least_mm);
         let unreached = measured.excess.unreached.at_least_mm.max(of_unseen);
         let is_never_cut = looked.is_never_cut();
-        Self { round, above, depth, unreached, is_never_cut }.served(&planned.plan.kept.faces, wanted)
+        Self { round, above, in_hollows: Vec::new(), depth, unreached, is_never_cut }
+            .served(&planned.plan.kept.faces, wanted)
     }
 
     /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once
@@ -121,6 +129,20 @@ impl Standing {
         round.highest_mm = round.highest_mm.min(highest);
         round.border_mm = round.border_mm.map(|border| border.min(highest));
         self
+    }
+
+    /// Leaves what another plan may leave lower. What is not among the places stays below the target.
+    pub(super) fn set_aside(
+        &mut self,
+        hollows: &mut Hollows<'_>,
+        target: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Cancelled> {
+        let taken = hollows.taken_from(&mut self.above, monitor)?;
+        self.in_hollows.extend(taken);
+        let heights = self.above.iter().map(|(_, height)| *height);
+        self.round.avoidable_mm = heights.fold((1.0 - SLACK) * target, f64::max);
+        Ok(())
     }
 }
 

@@ -159,6 +159,67 @@ fn passes_are_not_narrowed_for_the_foot_of_a_wall() {
     }
 }
 
+/// A plate of 16 mm with a boss of 4 mm on its top, 1 mm up walls of 30 degrees, finished by a ball of 3 mm for
+/// ridges of 0.02 mm.
+fn over_boss(strategy: &str) -> report::ToolpathResult {
+    let foot = 2.0 + 1.0 / 30f64.to_radians().tan();
+    let square = |half: f64, z: f64| {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]| format!("vertex {} {} {z}\n", x * half, y * half))
+    };
+    let [border, foot, top] = [square(8.0, 0.0), square(foot, 0.0), square(2.0, 1.0)];
+    let facet =
+        |a: &str, b: &str, c: &str| format!("facet normal 0 0 0\nouter loop\n{a}{b}{c}endloop\nendfacet\n");
+    let four = |[a, b, c, d]: [&str; 4]| facet(a, b, c) + &facet(a, c, d);
+    let mut facets = four([0, 1, 2, 3].map(|k| &*top[k]));
+    for (outer, inner) in [(&border, &foot), (&foot, &top)] {
+        facets.extend(
+            (0..4)
+                .map(|k| (k, (k + 1) % 4))
+                .map(|(a, b)| four([&*outer[a], &*outer[b], &*inner[b], &*inner[a]])),
+        );
+    }
+    let file = std::env::temp_dir().join(format!("boss_{strategy}_{}.stl", std::process::id()));
+    std::fs::write(&file, format!("solid boss\n{facets}endsolid boss\n")).unwrap();
+    let text = format!(
+        "[part]\nfile = {:?}\n[cutter]\nshape = \"ball\"\ndiameter = 3\n[tolerance]\nscallop = 0.02\nuncut = 0.2\n\
+         [[toolpath]]\nstrategy = \"{strategy}\"\n",
+        file.to_str().unwrap()
+    );
+    let session = Session::new(Scene::parse("boss.toml", text).unwrap()).unwrap();
+    let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
+    std::fs::remove_file(file).unwrap();
+    result
+}
+
+/// Along the foot of a boss every path of a ball leaves 0.055 mm. The ridges on level ground come below the target
+/// all the same, and no pass is narrowed for the foot.
+#[test]
+fn what_every_path_leaves_keeps_no_other_place_from_being_corrected() {
+    let stands = 1.5 * (1.0 - (1.0 - 15f64.to_radians().tan().powi(2)).sqrt());
+    for strategy in ["streamline", "zigzag"] {
+        let result = over_boss(strategy);
+        let rounds = figure(&result).unwrap()["rounds"].as_array().unwrap();
+        let length = |round: &serde_json::Value| round["cutting_length_mm"].as_f64().unwrap();
+        assert!((2..=5).contains(&rounds.len()), "{strategy}: {rounds:?}");
+        let kept = result.path.cutting_length_mm;
+        assert!(kept <= 1.2 * length(&rounds[0]), "{strategy}: {kept} {rounds:?}");
+        // The ball touches ground and wall as far from the foot.
+        let reach = 1.5 * 15f64.to_radians().tan();
+        let foot = 8.0 * (2.0 + 1.0 / 30f64.to_radians().tan());
+        let over = result.scallop.over_target_fraction.unwrap();
+        assert!(over <= 2.0 * reach * foot / 256.0, "{strategy}: {over} {rounds:?}");
+        let left = figure_of(&result, "least_left").unwrap();
+        let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| left[key].as_f64().unwrap());
+        // At a corner of the foot it leaves less.
+        assert!(
+            height - bound <= stands && result.scallop.max_mm.unwrap() <= 2.0 * stands,
+            "{strategy}: {left}"
+        );
+        assert_eq!(result.verdict, report::Verdict::Fail, "{strategy}");
+    }
+}
+
 /// Counts how often all that a plan leaves is measured.
 struct Looks(AtomicUsize);
 
@@ -210,7 +271,7 @@ fn short_passes_that_cut_too_deep_give_way_to_the_plan_before_them() {
         earlier: &[],
         around,
         engine,
-        goal: Goal { target, rule: session.scene.scallop_rule },
+        goal: Goal { target, rule: session.scene.scallop_rule, is_hopeless: false },
         closeness,
         best: deep,
         rounds: vec![standing.round],
@@ -221,8 +282,7 @@ fn short_passes_that_cut_too_deep_give_way_to_the_plan_before_them() {
         kept: 0,
         made: Vec::new(),
         is_complete: false,
-        is_hopeless: false,
-        least_left: 0.0,
+        hollows: None,
     };
     assert_eq!(corrected.cut_of(&standing), Cut::FarTooDeep);
     let looked = corrected.unless_touched_up_too_deep(looked, &Silent).unwrap();

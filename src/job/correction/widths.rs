@@ -1,7 +1,7 @@
 //! How much narrower or wider than by calculation passes are planned, where their chords are shorter, and
 //! which places get passes of their own.
 
-use geometry::{Point3, Vector3};
+use geometry::{Point2, Point3, Vector3};
 use motion::ROUNDING;
 use toolpath::{Correction, Lowered};
 
@@ -47,6 +47,8 @@ pub(super) struct Widths {
     pub lowered: Vec<Vec<Lowered>>,
     /// Places that get passes of their own, while all others stay where they are.
     pub touch_up: Vec<Point3>,
+    /// Lines in the plan view that get passes of their own likewise.
+    pub creases: Vec<Vec<Point2>>,
     /// How far around a place its factor holds, mm: the interval of passes on a plane.
     pub interval: f64,
 }
@@ -54,7 +56,8 @@ pub(super) struct Widths {
 impl Widths {
     /// As calculated, for passes that lie so far apart on a plane, mm.
     pub fn by_calculation(interval: f64) -> Self {
-        Self { places: Vec::new(), everywhere: 1.0, lowered: Vec::new(), touch_up: Vec::new(), interval }
+        let (places, lowered, touch_up, creases) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { places, everywhere: 1.0, lowered, touch_up, creases, interval }
     }
 
     pub fn correction(&self) -> Correction {
@@ -67,7 +70,7 @@ impl Widths {
 
     /// Without what served the places of these very passes.
     fn unserved(&self) -> Self {
-        Self { lowered: Vec::new(), touch_up: Vec::new(), ..self.clone() }
+        Self { lowered: Vec::new(), touch_up: Vec::new(), creases: Vec::new(), ..self.clone() }
     }
 
     /// Whether passes are the same, but for those of their own and for how deep they go.
@@ -105,6 +108,11 @@ impl Widths {
         places.sort_by(|a, b| b.over.total_cmp(&a.over));
         let touch_up = self.touch_up.iter().copied().chain(places.iter().map(|place| place.at)).collect();
         Self { touch_up, ..self.clone() }
+    }
+
+    /// With passes of their own along further lines.
+    pub fn with_creases(&self, lines: Vec<Vec<Point2>>) -> Self {
+        Self { creases: self.creases.iter().cloned().chain(lines).collect(), ..self.clone() }
     }
 
     /// Narrower where ridges and borders stand above the target, so that they come to the middle of the

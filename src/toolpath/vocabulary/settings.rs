@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Correction, Faces, Kept, Places, PlanError};
 use crate::lowering::Lowered;
-use geometry::{Aabb, Point3};
+use geometry::{Aabb, Point2, Point3};
 use machine::Machine;
 
 /// How far neighbouring passes lie apart.
@@ -122,6 +122,9 @@ pub struct Earlier {
     pub lowered: Vec<Vec<Lowered>>,
     /// Places on the design over which passes of their own are added, the most needed first.
     pub touch_up: Vec<Point3>,
+    /// Lines in the plan view, mm, along which the cutter stands on the part at more than one place: each gets a
+    /// pass of its own; a line of one place is served as the places above are.
+    pub creases: Vec<Vec<Point2>>,
     /// What its strategy planned: levels of its functions are placed anew.
     pub kept: Arc<Kept>,
     /// Whether functions that were searched may be gone on with by these factors: many places are narrower.
