@@ -146,7 +146,7 @@ impl Session {
             Step::Scallop(target) if request.correct => Some(target),
             _ => None,
         };
-        let first = self.plan(request, around, None, monitor)?;
+        let first = self.plan_way(request, around, None, monitor)?;
         let map = match target {
             // Between its stretches stands what others left: its moves alone do not tell how high.
             Some(_) if !request.is_for_places() => self.ridges(request, engine, &first, monitor)?,
@@ -180,7 +180,7 @@ impl Session {
                 Some(looked) if looked.is_as_verdict => looked,
                 _ => whole(&first, Closeness::Verdict)?,
             };
-            return Ok((first, measured, covered));
+            return Ok((self.with_feeds(request, first, monitor)?, measured, covered));
         };
         let interval = plane_interval(&request.tooling.cutter, request.step);
         let widths = Widths::by_calculation(interval);
@@ -219,6 +219,8 @@ impl Session {
         let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
         Ok((best, measured, covered))
+        // Plans are compared by what they leave and by their lengths: of feeds only those of the best one are told.
+        let best = self.with_feeds(request, best, monitor)?;
     }
 }
 
@@ -467,7 +469,7 @@ impl Corrected<'_> {
             anew: alike.is_none() && self.stands_high_in_many_places(),
             again: alike.is_some() && self.request.axis.is_none(),
         };
-        Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
+        Ok((self.session.plan_way(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
 
     /// Whether each plan so far leaves many ridges above the target.
