@@ -155,6 +155,7 @@ impl Session {
         let closeness = target.map_or(Closeness::Verdict, |target| Closeness::Plan {
             within: SLACK * target,
             limit: self.scene.scallop_rule.highest * target,
+            allowed_depth: 0.0,
         });
         let whole = |planned: &Planned, closeness| {
             self.look(request, earlier, engine, &planned.plan.path, closeness, monitor)
@@ -211,16 +212,16 @@ impl Session {
             Some(looked) => looked,
             None => {
                 corrected.by_ridges(map.map_or(MEASURED_SLACK, |map| slack_of(&map)), monitor)?;
-                corrected.look_at_best(closeness, monitor)?
+                corrected.look_at_best(closeness, None, monitor)?
             }
         };
         let looked = corrected.unless_touched_up_too_deep(looked, monitor)?;
         let Looked { measured, covered, .. } = corrected.by_measurements(looked, monitor)?;
         let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
-        Ok((best, measured, covered))
         // Plans are compared by what they leave and by their lengths: of feeds only those of the best one are told.
         let best = self.with_feeds(request, best, monitor)?;
+        Ok((best, measured, covered))
     }
 }
 
@@ -294,7 +295,7 @@ impl Corrected<'_> {
         let (planned, factors) = self.plan(&before, monitor)?;
         let (again, found, gain) = self.compared(&planned, factors, false, monitor)?;
         self.keep_if(gain, planned, before, found);
-        if gain == Gain::None { self.look_at_best(self.closeness, monitor) } else { Ok(again) }
+        if gain == Gain::None { self.look_at_best(self.closeness, None, monitor) } else { Ok(again) }
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
@@ -307,6 +308,8 @@ impl Corrected<'_> {
             return Ok(looked);
         }
         let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
+        // What no cell sees of the best plan, once its cells gave way to another one's.
+        let mut beside_cells = None;
         for round in 0..MOST_MEASURED_NEAR {
             if round >= MOST_MEASURED && gain < Gain::Much && !self.is_near(&self.tried) {
                 break;
@@ -326,11 +329,12 @@ impl Corrected<'_> {
             } else {
                 let is_passing = looked.as_ref().is_some_and(|looked| self.session.passes(looked));
                 // Two at a time might be more than the memory that the run may take.
-                drop(looked.take());
+                beside_cells = looked.take().and_then(Looked::beside_cells).or(beside_cells);
                 let (again, found);
                 (again, found, gain) = self.compared(&planned, factors, is_passing, monitor)?;
                 self.keep_if(gain, planned, next, found);
                 looked = (gain != Gain::None).then_some(again);
+                beside_cells = beside_cells.filter(|_| gain == Gain::None);
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
@@ -338,7 +342,7 @@ impl Corrected<'_> {
             Some(looked) if looked.is_as_verdict => looked,
             other => {
                 drop(other);
-                self.look_at_best(Closeness::Verdict, monitor)?
+                self.look_at_best(Closeness::Verdict, beside_cells, monitor)?
             }
         };
         self.look_at_all_of_best(&mut looked, monitor)?;
@@ -355,8 +359,8 @@ impl Corrected<'_> {
         monitor: &dyn Monitor,
     ) -> Result<(Looked, Standing, Gain), JobError> {
         let (session, path) = (self.session, &planned.plan.path);
-        let mut looked =
-            session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+        let closeness = self.closeness.compared(session.scene.tolerance.gouge);
+        let mut looked = session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
         let passes = [is_passing, session.passes(&looked)];
         let standing = |looked: &Looked| Standing::of_all(looked, planned, factors, self.wanted(true));
         let mut found = standing(&looked);
@@ -477,10 +481,23 @@ impl Corrected<'_> {
         self.rounds.iter().all(|round| round.over_target_fraction.is_some_and(|over| over > MANY))
     }
 
-    /// Measures the best plan, where no cell sees as well unless the rest fails for certain.
-    fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
-        let path = &self.best.plan.path;
-        let looked = self.session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
+    /// Measures the best plan, where no cell sees as well unless the rest fails for certain. What is `known` of that
+    /// is as it was beside the same cells.
+    fn look_at_best(
+        &mut self,
+        closeness: Closeness,
+        known: Option<(Covered, f64)>,
+        monitor: &dyn Monitor,
+    ) -> Result<Looked, JobError> {
+        let (session, path) = (self.session, &self.best.plan.path);
+        let mut looked =
+            session.look_at_cells(self.request, self.earlier, self.engine, path, closeness, monitor)?;
+        match known.filter(|(_, cell)| looked.measured.cell == *cell) {
+            Some((covered, _)) => (looked.covered, looked.of_cells_alone) = (Some(covered), false),
+            None => {
+                session.look_beside_unless_failed(self.request, self.earlier, path, &mut looked, monitor)?
+            }
+        }
         self.tell_of_best(&looked);
         Ok(looked)
     }
