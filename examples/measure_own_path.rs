@@ -38,6 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stock = cut(ZMap::block(grid, 1.0), &cutter, &path, &Silent)?;
     let limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 1e-5,
         most_cells: 1_000_000,
         most_squares: 1_000_000,

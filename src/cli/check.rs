@@ -16,6 +16,7 @@ pub fn check(path: &Path, progress: &Progress) -> Result<String, CliError> {
     let scene = Scene::read(path)?;
     progress.watched().allow_memory(scene.simulation.memory_mib, work::parallel::threads());
     let session = Session::load(scene, progress)?;
+    let beside = session.boundaries_beside_part();
     let Session { mut scene, part, cells: (grid, note), notes, doubt, .. } = session;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
@@ -29,7 +30,8 @@ pub fn check(path: &Path, progress: &Progress) -> Result<String, CliError> {
             "Note: the cell is chosen by the program, from the cutter and the steps of the toolpaths".into(),
         );
     }
-    found.extend(notes.into_iter().chain(note).chain(doubt).map(|note| format!("Note: {note}")));
+    found
+        .extend(notes.into_iter().chain(note).chain(doubt).chain(beside).map(|note| format!("Note: {note}")));
     let mut text = String::new();
     for line in found {
         // A line break in a file's name would end the comment.

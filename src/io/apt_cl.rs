@@ -1,6 +1,6 @@
 //! Writes a toolpath as cutter locations in APT text (ISO 3592, ISO 4343). mm, mm/min, degrees.
 
-use super::program_text::{ProgramHeader, describe, number, number_to};
+use super::program_text::{NO_MOVES, ProgramHeader, describe, number, number_to};
 use cutter::Cutter;
 use motion::{ClPoint, Cutters, MoveKind, Toolpath};
 use std::io::{self, Write};
@@ -15,7 +15,7 @@ const AXIS_DECIMALS: usize = 7;
 /// `FEDRAT` wherever the feed changes. What a program says of the spindle is written where it says so, instead
 /// of the header's speed. Numbers have four decimals, so each coordinate stands within 0.05 µm
 /// of the path. Where the tool axis is not z throughout, `MULTAX/ON` is written and every location is
-/// `x,y,z,i,j,k`.
+/// `x,y,z,i,j,k`. Where there is no move the spindle stands, and the tool stays where it is.
 ///
 /// # Errors
 /// Whatever the writer returns.
@@ -32,7 +32,7 @@ pub fn write(
     load(writer, path.named_tool_of(0))?;
     writeln!(writer, "CUTTER/{}", cutter_words(cutters.first()))?;
     let from_header: Vec<(u32, f64)> =
-        header.spindle_speed.map(|speed| (0, speed.round())).into_iter().collect();
+        header.speed_for(path).map(|speed| (0, speed.round())).into_iter().collect();
     let said = if path.origin.spindle.is_empty() { &from_header } else { &path.origin.spindle };
     let mut spindle = said.iter().peekable();
     // A spindle that nobody turned on stands.
@@ -47,6 +47,10 @@ pub fn write(
         writeln!(writer, "MULTAX/ON")?;
     }
     writeln!(writer, "FROM/{}", location(&path.start, upright))?;
+    if path.is_empty() {
+        // What has no motion at all is no program to readers.
+        writeln!(writer, "PPRINT {NO_MOVES}\nRAPID\nGOTO/{}", location(&path.start, upright))?;
+    }
     let mut feed = None;
     for (k, step) in path.moves.iter().enumerate() {
         while let Some((_, cutter)) = others.next_if(|(first, _)| *first as usize <= k) {
@@ -214,6 +218,15 @@ FINI
                 assert!((a - b).abs() < 2e-3, "{text} at {rho}: {a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn a_path_without_moves_turns_no_spindle() {
+        let mut path = example();
+        path.moves.clear();
+        let header = ProgramHeader { spindle_speed: Some(12_000.0), ..ProgramHeader::default() };
+        let text = text(&path, &Cutter::ball(6.0).unwrap(), &header);
+        assert!(text.contains("PPRINT NO MOVES\nRAPID\nGOTO/") && !text.contains("SPINDL"), "{text}");
     }
 
     #[test]

@@ -14,7 +14,7 @@ mod five_axis;
 pub(crate) use five_axis::tests as five_axis_tests;
 pub use five_axis::{FiveAxisPost, Style, TCP_WORDS, write_five_axis};
 
-use super::program_text::{ProgramHeader, describe, number};
+use super::program_text::{NO_MOVES, ProgramHeader, describe, number};
 use arcs::Arc;
 pub use arcs::ArcRule;
 use cutter::Cutter;
@@ -33,7 +33,7 @@ pub type MoveLines = Vec<u32>;
 ///
 /// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before the
 /// first move the tip rises to the highest tip of the path, or to what the header asks for, moves over its
-/// start and comes down there; after the last one it rises again.
+/// start and comes down there; after the last one it rises again. Where there is no move the spindle stands.
 ///
 /// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of
 /// them all.
@@ -59,8 +59,12 @@ pub fn write(
     program.line(&format!("({})", describe(cutter)))?;
     program.line("(MM, TIP OF THE CUTTER)")?;
     program.line("G17 G21 G40 G80 G90 G94")?;
-    if let Some(speed) = header.spindle_speed {
+    let speed = header.speed_for(path);
+    if let Some(speed) = speed {
         program.line(&format!("S{} M3", speed.round()))?;
+    }
+    if path.is_empty() {
+        program.line(&format!("({NO_MOVES})"))?;
     }
     program.rise(top)?;
     program.go(Point3::new(start.x, start.y, top), None)?;
@@ -81,7 +85,7 @@ pub fn write(
         }
     }
     program.rise(top)?;
-    if header.spindle_speed.is_some() {
+    if speed.is_some() {
         program.line("M5")?;
     }
     program.line("M30")?;
@@ -261,5 +265,9 @@ M30
         path.moves.clear();
         let (text, lines) = text(&path, &ProgramHeader::default());
         assert!(lines.is_empty() && text.ends_with("M30\n%\n") && !text.contains("M3\n"), "{text}");
+        // Nothing is cut, so that no spindle turns.
+        let header = ProgramHeader { spindle_speed: Some(12_000.0), ..ProgramHeader::default() };
+        let (text, _) = self::text(&path, &header);
+        assert!(text.contains("(NO MOVES)\n") && !text.contains("M3\n") && !text.contains("M5"), "{text}");
     }
 }

@@ -1,7 +1,7 @@
 //! What the two program writers share: the header's data and the way numbers and names are written.
 
 use cutter::{Cutter, CutterKey};
-use motion::{DECIMALS, in_last_decimals};
+use motion::{DECIMALS, Toolpath, in_last_decimals};
 
 /// Longest name that is written; longer ones are cut. Controls refuse lines far beyond it.
 const NAME_LENGTH: usize = 60;
@@ -20,12 +20,20 @@ pub struct ProgramHeader {
 }
 
 impl ProgramHeader {
+    /// The speed of the spindle for a path; none where nothing moves.
+    pub(super) fn speed_for(&self, path: &Toolpath) -> Option<f64> {
+        self.spindle_speed.filter(|_| !path.is_empty())
+    }
+
     /// The name as every control can read it.
     pub(super) fn plain_name(&self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || " ._+-".contains(c) { c } else { '_' };
         self.name.chars().take(NAME_LENGTH).map(plain).collect()
     }
 }
+
+/// What a program says that has no moves: its spindle stands.
+pub(super) const NO_MOVES: &str = "NO MOVES";
 
 /// A number with four decimals, trailing zeros left out but for one: a control may read a number
 /// without a decimal point as micrometres.

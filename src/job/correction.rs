@@ -10,7 +10,8 @@
 //! own, which leave all others where they are as well. Else levels are placed anew, narrower around the
 //! places that stood too high, of functions that are kept from round to round. Where many stand little above
 //! the target, the widths of the whole plan are scaled, which leaves its passes in shape; so they are where
-//! narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much.
+//! narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much, nor
+//! beside it; last of all, passes along such places take down what can be.
 //!
 //! Where an engine tells ridges apart, the first rounds measure no more than those, on cells as coarse as
 //! show every pass. Then all is measured as the verdict is; what still stands above the target then is
@@ -143,7 +144,7 @@ impl Session {
             Step::Scallop(target) if request.correct => Some(target),
             _ => None,
         };
-        let first = self.plan(request, around, None, monitor)?;
+        let first = self.plan_way(request, around, None, monitor)?;
         let map = match target {
             // Between its stretches stands what others left: its moves alone do not tell how high.
             Some(_) if !request.is_for_places() => self.ridges(request, engine, &first, monitor)?,
@@ -152,6 +153,7 @@ impl Session {
         let closeness = target.map_or(Closeness::Verdict, |target| Closeness::Plan {
             within: SLACK * target,
             limit: self.scene.scallop_rule.highest * target,
+            allowed_depth: 0.0,
         });
         let whole = |planned: &Planned, closeness| {
             self.look(request, earlier, engine, &planned.plan.path, closeness, monitor)
@@ -177,7 +179,7 @@ impl Session {
                 Some(looked) if looked.is_as_verdict => looked,
                 _ => whole(&first, Closeness::Verdict)?,
             };
-            return Ok((first, measured, covered));
+            return Ok((self.with_feeds(request, first, monitor)?, measured, covered));
         };
         let interval = plane_interval(&request.tooling.cutter, request.step);
         let widths = Widths::by_calculation(interval);
@@ -207,7 +209,7 @@ impl Session {
             Some(looked) => looked,
             None => {
                 corrected.by_ridges(map.map_or(MEASURED_SLACK, |map| slack_of(&map)), monitor)?;
-                corrected.look_at_best(closeness, monitor)?
+                corrected.look_at_best(closeness, None, monitor)?
             }
         };
         let looked = corrected.unless_touched_up_too_deep(looked, monitor)?;
@@ -215,6 +217,8 @@ impl Session {
         let Corrected { mut best, rounds, kept, .. } = corrected;
         let rounds = rounds.iter().map(CorrectionRound::told).collect();
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
+        // Plans are compared by what they leave and by their lengths: of feeds only those of the best one are told.
+        let best = self.with_feeds(request, best, monitor)?;
         Ok((best, measured, covered))
     }
 }
@@ -292,7 +296,7 @@ impl<'a> Corrected<'a> {
         let (planned, factors) = self.plan(&before, monitor)?;
         let (again, found, gain) = self.compared(&planned, factors, false, monitor)?;
         self.keep_if(gain, planned, before, found);
-        if gain == Gain::None { self.look_at_best(self.closeness, monitor) } else { Ok(again) }
+        if gain == Gain::None { self.look_at_best(self.closeness, None, monitor) } else { Ok(again) }
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
@@ -302,6 +306,8 @@ impl<'a> Corrected<'a> {
         }
         self.seek_hollows(&looked, monitor)?;
         let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
+        // What no cell sees of the best plan, once its cells gave way to another one's.
+        let mut beside_cells = None;
         for round in 0..MOST_MEASURED_NEAR {
             if round >= MOST_MEASURED && gain < Gain::Much && !self.is_near(&self.tried) {
                 break;
@@ -321,23 +327,25 @@ impl<'a> Corrected<'a> {
             } else {
                 let is_passing = looked.as_ref().is_some_and(|looked| self.session.passes(looked));
                 // Two at a time might be more than the memory that the run may take.
-                drop(looked.take());
+                beside_cells = looked.take().and_then(Looked::beside_cells).or(beside_cells);
                 let (again, found);
                 (again, found, gain) = self.compared(&planned, factors, is_passing, monitor)?;
                 self.keep_if(gain, planned, next, found);
                 looked = (gain != Gain::None).then_some(again);
+                beside_cells = beside_cells.filter(|_| gain == Gain::None);
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         if let Some(next) = self.along_creases(monitor)? {
-            drop(looked.take());
+            beside_cells = looked.take().and_then(Looked::beside_cells).or(beside_cells);
             looked = self.unless_nothing_sinks(next, monitor)?;
+            beside_cells = beside_cells.filter(|_| looked.is_none());
         }
         let mut looked = match looked {
             Some(looked) if looked.is_as_verdict => looked,
             other => {
                 drop(other);
-                self.look_at_best(Closeness::Verdict, monitor)?
+                self.look_at_best(Closeness::Verdict, beside_cells, monitor)?
             }
         };
         self.look_at_all_of_best(&mut looked, monitor)?;
@@ -354,8 +362,8 @@ impl<'a> Corrected<'a> {
         monitor: &dyn Monitor,
     ) -> Result<(Looked, Standing, Gain), JobError> {
         let (session, path) = (self.session, &planned.plan.path);
-        let mut looked =
-            session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+        let closeness = self.closeness.compared(session.scene.tolerance.gouge);
+        let mut looked = session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
         let passes = [is_passing, session.passes(&looked)];
         let standing = |of: &mut Self, looked: &Looked| {
             let mut found = Standing::of_all(looked, planned, factors, of.wanted(true));
@@ -524,7 +532,7 @@ impl<'a> Corrected<'a> {
             anew: alike.is_none() && self.stands_high_in_many_places(),
             again: alike.is_some() && self.request.axis.is_none(),
         };
-        Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
+        Ok((self.session.plan_way(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
 
     /// Whether each plan so far leaves many ridges above the target.
@@ -532,10 +540,23 @@ impl<'a> Corrected<'a> {
         self.rounds.iter().all(|round| round.over_target_fraction.is_some_and(|over| over > MANY))
     }
 
-    /// Measures the best plan, where no cell sees as well unless the rest fails for certain.
-    fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
-        let path = &self.best.plan.path;
-        let looked = self.session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
+    /// Measures the best plan, where no cell sees as well unless the rest fails for certain. What is `known` of that
+    /// is as it was beside the same cells.
+    fn look_at_best(
+        &mut self,
+        closeness: Closeness,
+        known: Option<(Covered, f64)>,
+        monitor: &dyn Monitor,
+    ) -> Result<Looked, JobError> {
+        let (session, path) = (self.session, &self.best.plan.path);
+        let mut looked =
+            session.look_at_cells(self.request, self.earlier, self.engine, path, closeness, monitor)?;
+        match known.filter(|(_, cell)| looked.measured.cell == *cell) {
+            Some((covered, _)) => (looked.covered, looked.of_cells_alone) = (Some(covered), false),
+            None => {
+                session.look_beside_unless_failed(self.request, self.earlier, path, &mut looked, monitor)?
+            }
+        }
         self.tell_of_best(&looked, monitor)?;
         Ok(looked)
     }

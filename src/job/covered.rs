@@ -119,9 +119,12 @@ impl Session {
             asked: scene.simulation.error_bound,
             finest: measured.cell,
             halvings: 0,
+            // A toolpath for the rest goes by all that stands.
+            leaves_the_rest: self.leaves_the_rest(request) && !self.rest_follows(request),
         };
-        // What fails anyway is looked at no closer.
-        let most = if self.verdict_on(measured) == Verdict::Fail { 0 } else { MOST_HALVINGS };
+        // What fails anyway is looked at no closer, nor is what another toolpath cuts off.
+        let is_enough = task.leaves_the_rest || self.verdict_on(measured) == Verdict::Fail;
+        let most = if is_enough { 0 } else { MOST_HALVINGS };
         loop {
             let found = coverage.measure_unseen(&task, monitor)?;
             let unseen = found.map(|UnseenSurface { measurement, spacing, above }| {

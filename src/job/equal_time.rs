@@ -92,7 +92,7 @@ impl Session {
         let highest = HIGHEST * if corner > 0.0 { corner } else { cutter.radius() };
         let asked_s = 60.0 * time.minutes;
         let mut plan = |scallop: f64| {
-            let planned = self.plan(&at(scallop), around, None, monitor)?;
+            let planned = self.plan(&at(scallop), around, monitor)?;
             let time = planned.time(scene, monitor)?;
             Ok::<_, JobError>((planned, time))
         };

@@ -241,7 +241,8 @@ impl Session {
         let (scene, path) = (&self.scene, run.path());
         let measurement = &run.measured.measurement;
         let (limits, rule) = (&scene.tolerance, &scene.scallop_rule);
-        let mut claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
+        let claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
+        let mut claims = judge::each_violation_once(claims);
         judge::name_strays(&mut claims, path.origin.strays);
         if let Some(read) = run.request.foreign() {
             claims = figures::with_lengths_open(claims, &read.findings);

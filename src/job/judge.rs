@@ -47,6 +47,34 @@ pub(crate) fn judge(
     claims
 }
 
+/// Of each limit that cells and normals both find violated the graver claim, with what the other one found.
+pub(crate) fn each_violation_once(claims: Vec<Claim>) -> Vec<Claim> {
+    let mut once: Vec<Claim> = Vec::with_capacity(claims.len());
+    let is_surface =
+        |claim: &Claim| ["gouge", "uncut", "scallop"].contains(&claim.what) && claim.unit == "mm";
+    for claim in claims {
+        let fails = |claim: &Claim| is_surface(claim) && claim.verdict() == Verdict::Fail;
+        let same = |other: &&mut Claim| {
+            fails(other) && fails(&claim) && other.what == claim.what && other.limit == claim.limit
+        };
+        match once.iter_mut().find(same) {
+            Some(other) => {
+                let is_graver = claim.measured.unwrap_or(0.0) > other.measured.unwrap_or(0.0);
+                let less = if is_graver { std::mem::replace(other, claim) } else { claim };
+                let (height, limit) = (less.measured.unwrap_or(0.0), less.limit);
+                let height = beside_limit(height, less.error_bound, limit);
+                let place = if less.text.ends_with(UNSEEN) { UNSEEN } else { " on the cells" };
+                other.text += &format!("; {height} µm{}", place.strip_prefix(',').unwrap_or(place));
+            }
+            None => once.push(claim),
+        }
+    }
+    once
+}
+
+/// What the sentence of a claim ends with that is not of cells.
+pub(crate) const UNSEEN: &str = ", measured along normals where no cell sees";
+
 /// What decides a claim that cells cannot.
 const STRAYS: &str = "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine], or shorter moves where axes \
                       turn, would decide it";

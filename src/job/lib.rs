@@ -4,6 +4,7 @@
 //! judge. A figure of the report is one file in `figures` and one line in their list; the rule by which a
 //! toolpath passes stands in `judge`.
 
+mod beside_part;
 mod correction;
 mod covered;
 mod earlier;

@@ -27,7 +27,12 @@ pub(crate) enum Closeness {
     /// No closer where the path is to be planned anew: its highest place stands above `limit`, mm, for
     /// certain. Where finer cells do not make a look closer, another plan takes less time than that: it is
     /// enough that the place, known to `within` mm, may stand above.
-    Plan { within: f64, limit: f64 },
+    Plan {
+        within: f64,
+        limit: f64,
+        /// A gouge that is shown to be no deeper than this, mm, is not known more closely; 0 where it is to be.
+        allowed_depth: f64,
+    },
 }
 
 impl Closeness {
@@ -37,10 +42,25 @@ impl Closeness {
         let highest = judge::highest_reached(&measured.measurement);
         match self {
             Self::Verdict => false,
-            Self::Plan { within, limit } => {
+            Self::Plan { within, limit, .. } => {
                 !coarse && highest.error_bound_mm <= within && highest.at_most() > limit
                     || highest.max_mm > limit && !(coarse && highest.error_bound_mm > asked)
             }
+        }
+    }
+}
+
+impl Closeness {
+    fn allowed_depth(self) -> f64 {
+        if let Self::Plan { allowed_depth, .. } = self { allowed_depth } else { 0.0 }
+    }
+
+    /// As closely, but for gouges that hold their limit, mm: a plan that is compared with another one may be given
+    /// up, and the one that is kept is measured again.
+    pub fn compared(self, gouge: f64) -> Self {
+        match self {
+            Self::Plan { within, limit, .. } => Self::Plan { within, limit, allowed_depth: gouge },
+            Self::Verdict => Self::Verdict,
         }
     }
 }
@@ -71,7 +91,9 @@ impl Session {
         let mut finest = auto_cell(&scene.toolpaths).min(simulation.cell);
         // Cells up to twice as wide as suits the scene show every pass.
         let is_first_look = engine.gains_by_cells() && FINER * cells.0.cell > finest;
-        let first = Task { is_first_look, ..self.task(request, (path, cutters), simulation, cells) };
+        let allowed_depth = closeness.allowed_depth();
+        let first =
+            Task { is_first_look, allowed_depth, ..self.task(request, (path, cutters), simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         if !engine.gains_by_cells() {
@@ -91,6 +113,7 @@ impl Session {
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
             let finer = cells.map(|cells| {
                 let task = self.task(request, (path, cutters), &simulation, &cells);
+                let task = Task { allowed_depth, ..task };
                 engine.measure(&task, monitor)
             });
             match finer {
@@ -105,7 +128,9 @@ impl Session {
                 _ => break,
             }
         }
-        Ok(MeasuredClosely { measured, is_as_verdict: true })
+        let is_as_verdict =
+            allowed_depth == 0.0 || measured.measurement.gouge.error_bound_mm <= simulation.error_bound;
+        Ok(MeasuredClosely { measured, is_as_verdict })
     }
 
     /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the

@@ -118,8 +118,20 @@ impl Planned {
 }
 
 impl Session {
-    /// Plans one toolpath, from what an earlier plan left if there is one.
+    /// Plans one toolpath.
     pub(crate) fn plan(
+        &self,
+        request: &ToolpathRequest,
+        around: Around<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Planned, JobError> {
+        let planned = self.plan_way(request, around, None, monitor)?;
+        self.with_feeds(request, planned, monitor)
+    }
+
+    /// The way of one toolpath, from what an earlier plan left if there is one: its feeds are those that were asked
+    /// for, and it stands in no program yet. What it cuts is that of the finished plan.
+    pub(crate) fn plan_way(
         &self,
         request: &ToolpathRequest,
         around: Around<'_>,
@@ -156,21 +168,36 @@ impl Session {
             within_engagement(planned(&*strategy)?, &*strategy, request.tooling.cutter.radius(), &planned)?;
         let engaged_thinly = self.engaged_thinly(request, &plan.path, monitor)?;
         let joints = joints(scene, request, around.tool, &plan.path)?;
-        if scene.machine.slow_corners {
-            let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
-            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()), monitor)?;
-        }
         let tops = around.fixtures.iter().map(|(mesh, _)| mesh.bounds().max.z + scene.clearance);
         let rise_to = tops.reduce(f64::max);
         let header = self.header(request, rise_to);
-        plan.path.origin.lines =
-            lines(scene, (&plan.path, &request.tooling.cutter), joints.as_ref(), &header)?;
         plan.path.origin.strays = scene.arcs.unwrap_or(0.0);
         if let Some(JointPath { strays: [tip, axis], .. }) = joints {
             plan.path.origin.strays += tip + axis * around.tool.cutter.reach();
             plan.path.origin.leans = axis;
         }
         Ok(Planned { joints, engaged, engaged_thinly, ..Planned::new(plan, strategy, header) })
+    }
+
+    /// A planned way with feeds that all axes follow, and its lines in the program.
+    pub(crate) fn with_feeds(
+        &self,
+        request: &ToolpathRequest,
+        mut planned: Planned,
+        monitor: &dyn Monitor,
+    ) -> Result<Planned, JobError> {
+        // Programs from elsewhere have their own.
+        if request.foreign().is_some() {
+            return Ok(planned);
+        }
+        let (scene, Planned { plan, joints, header, .. }) = (&self.scene, &mut planned);
+        if scene.machine.slow_corners {
+            let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
+            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()), monitor)?;
+        }
+        plan.path.origin.lines =
+            lines(scene, (&plan.path, &request.tooling.cutter), joints.as_ref(), header)?;
+        Ok(planned)
     }
 
     fn path(

@@ -355,6 +355,7 @@ impl Session {
             judged: self.scene.judged,
             pocket: self.pocket.is_some(),
             is_first_look: false,
+            allowed_depth: 0.0,
         }
     }
 }

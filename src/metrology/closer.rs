@@ -166,10 +166,10 @@ impl PartialOrd for Square {
 
 /// Searches `squares`, all of one size, for values above `known`, holding no more than `held` at a time. `at`
 /// tells what the square around a place with a given half side holds, and at which of its places; `None` off
-/// the part.
+/// the part. `asked` tells how closely a greatest value is to be known.
 ///
 /// # Tolerance
-/// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
+/// `possible` exceeds the greater of `known` and the value found by no more than is asked unless [`MOST`]
 /// places or `held` squares did not suffice. It is as right as the bounds that `at` gives.
 ///
 /// # Errors
@@ -177,7 +177,7 @@ impl PartialOrd for Square {
 pub(super) fn greatest(
     squares: Vec<Square>,
     known: f64,
-    asked: f64,
+    asked: &dyn Fn(f64) -> f64,
     held: usize,
     at: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
     monitor: &dyn Monitor,
@@ -194,7 +194,7 @@ pub(super) fn greatest(
         let found = at(centre, half).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, &|_| asked, Effort::whole(MOST, held), &inside, &|_, _| true, monitor)
+    search(squares, known, asked, Effort::whole(MOST, held), &inside, &|_, _| true, monitor)
 }
 
 /// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside`
@@ -277,7 +277,7 @@ mod tests {
         let squares = centres.filter_map(|centre| {
             at(centre, 0.5).map(|(_, v)| Square { possible: v.possible, centre, half: 0.5 })
         });
-        greatest(squares.collect(), known, asked, usize::MAX, &at, &Silent).unwrap()
+        greatest(squares.collect(), known, &|_| asked, usize::MAX, &at, &Silent).unwrap()
     }
 
     #[test]
@@ -346,6 +346,31 @@ mod tests {
         assert_eq!(run(8, 0.0, &crest), run(8, f64::INFINITY, &crest));
     }
 
+    /// The brink of a cliff, along which no square closes soon: a bound that is enough ends the search.
+    #[test]
+    fn a_bound_that_is_enough_ends_a_search() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let run = |asked: &dyn Fn(f64) -> f64| {
+            let places = AtomicUsize::new(0);
+            let at = |p: Point2, half: f64| {
+                places.fetch_add(1, Ordering::Relaxed);
+                let off = 9.03 - 0.1 * p.y - p.x;
+                let here = if off > 0.0 { 1.0 - 0.5 * off } else { 0.0 };
+                // The square may reach up to the brink, where it holds any of it.
+                let possible =
+                    if off > -1.2 * half { here.max(1.0 - 0.5 * off.max(0.0)) + 0.8 * half } else { here };
+                Some((p, Value { here, possible }))
+            };
+            let centres = (0..400).map(|k| Point2::new(f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5));
+            let squares = centres.map(|centre| Square { possible: 2.0, centre, half: 0.5 }).collect();
+            (greatest(squares, 0.0, asked, usize::MAX, &at, &Silent).unwrap(), places.into_inner())
+        };
+        let (closely, all) = run(&|_| 1e-4);
+        let (enough, few) = run(&|best| 1.25 - best);
+        assert!(closely.possible <= 1.0 + 1e-4 && enough.possible <= 1.25, "{closely:?} {enough:?}");
+        assert!(few < all / 2, "{all} {few}");
+    }
+
     #[test]
     fn a_peak_beside_the_border_is_found_and_nothing_beyond_it() {
         // The value rises to the border at x = 2.93; the centre of the last square is off.
@@ -355,7 +380,7 @@ mod tests {
             let (here, slope) = cliff(centre)?;
             Some((centre, Value { here, possible: here + 1.5 * slope * half }))
         };
-        let value = greatest(squares, 0.0, 1e-3, usize::MAX, &at, &Silent).unwrap().greatest.unwrap().0;
+        let value = greatest(squares, 0.0, &|_| 1e-3, usize::MAX, &at, &Silent).unwrap().greatest.unwrap().0;
         assert!((2.93 - 2e-3..=2.93).contains(&value), "{value}");
     }
 }

@@ -45,6 +45,7 @@ pub(super) fn measured_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], 
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
     let cut = cut(ZMap::block(grid, top), cutter, &path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 5e-4,
         border_cuts: true,
         steep_elsewhere: false,

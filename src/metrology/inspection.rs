@@ -80,6 +80,8 @@ pub(super) struct Inspection<'a> {
     pub limits: &'a Limits,
     /// The error bound that is asked for, mm.
     pub asked: f64,
+    /// A gouge that is shown to be no deeper than this, mm, need not be known more closely.
+    pub allowed_depth: f64,
     /// Squares that a search may hold at a time.
     pub most_squares: usize,
     /// Whether finer cells follow where a limit stays open.
@@ -350,8 +352,11 @@ impl Inspection<'_> {
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
         let known = figures.max_depth_mm;
+        // Figures have this floor on top, twice where what was found is the deepest.
+        let asked = |depth: f64| self.asked.max(self.allowed_depth - 2.0 * NUMERICAL_FLOOR - depth);
+        let sample = |k: usize| samples[k];
         let found =
-            self.between_centres(cells, known, &|k| samples[k], &Self::depth, self.creases, monitor)?;
+            self.between_centres(cells, (known, &asked), &sample, &Self::depth, self.creases, monitor)?;
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.at_least_mm = (figures.max_depth_mm - NUMERICAL_FLOOR).max(0.0);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
@@ -372,13 +377,13 @@ impl Inspection<'_> {
         Value { here: -d.distance, possible: -d.distance + d.slope * reach(half, lean) }
     }
 
-    /// The greatest value above `known` in the squares of `cells` and those along `creases`, and what may be
-    /// there at most. `value` makes it of a deviation, the lean of the design's normal, and half the side of
+    /// The greatest value above `known` in the squares of `cells` and those along `creases`, as closely as is
+    /// `asked`, and what may be there at most. `value` makes it of a deviation, the lean of the design's normal, and half the side of
     /// a square.
     fn between_centres(
         &self,
         cells: impl Iterator<Item = usize>,
-        known: f64,
+        (known, asked): (f64, &dyn Fn(f64) -> f64),
         sample: &dyn Fn(usize) -> Sample,
         value: &(dyn Fn(&Deviation, f64, f64) -> Value + Sync),
         creases: Option<&Creases>,
@@ -429,7 +434,7 @@ impl Inspection<'_> {
         });
         let squares = along_creases.into_iter().flatten().chain(squares);
         let open = Promising::of(squares, MOST_SEARCHED.min(self.most_squares / 2).max(1));
-        let mut found = closer::greatest(open.squares, known, self.asked, self.most_squares, &at, monitor)?;
+        let mut found = closer::greatest(open.squares, known, asked, self.most_squares, &at, monitor)?;
         found.possible = found.possible.max(open.others);
         Ok(found)
     }
@@ -611,7 +616,8 @@ impl Inspection<'_> {
             here: d.distance,
             possible: d.distance + d.slope * reach(half, lean),
         };
-        let found = self.between_centres(all, known, &|k| samples[k], &value, None, monitor)?;
+        let asked = |_: f64| self.asked;
+        let found = self.between_centres(all, (known, &asked), &|k| samples[k], &value, None, monitor)?;
         if let Some((height, q)) = found.greatest {
             let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
             let holds = |k: &usize| cell.is_some_and(|cell| cells[*k].contains(&cell));

@@ -81,6 +81,7 @@ pub(crate) fn measure_with_walls(
         cutters,
         limits,
         asked: bound,
+        allowed_depth: asked.allowed_depth,
         most_squares: asked.most_squares,
         is_first_look: asked.is_first_look,
         surface: &surface,

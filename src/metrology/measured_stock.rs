@@ -253,6 +253,7 @@ mod tests {
     const LIMITS: Limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
 
     const ASKED: Asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 1e-5,
         most_cells: 1_000_000,
         most_squares: 1_000_000,

@@ -282,6 +282,7 @@ mod tests {
             let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
             let cut = cut(ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
             let asked = Asked {
+                allowed_depth: 0.0,
                 error_bound: 5e-4,
                 border_cuts: true,
                 steep_elsewhere: false,

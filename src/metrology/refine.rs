@@ -38,6 +38,8 @@ const MOST_RECTANGLES: usize = 256;
 pub struct Asked {
     /// Error bound of the highest scallop, the deepest gouge and the highest uncut place, mm.
     pub error_bound: f64,
+    /// A gouge that is shown to be no deeper than this, mm, need not be known as closely; 0 where all are to be.
+    pub allowed_depth: f64,
     /// Whether cuts beside the part's borders are looked for. Beside the floor of a pocket stand its walls,
     /// which tell theirs.
     pub border_cuts: bool,

@@ -139,6 +139,7 @@ pub(super) fn on_cells<'a>(
         cutters,
         limits,
         asked,
+        allowed_depth: 0.0,
         most_squares: 0,
         is_first_look: false,
         surface,

@@ -16,6 +16,7 @@ const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord:
 const TOP: f64 = 2.0;
 
 const ASKED: Asked = Asked {
+    allowed_depth: 0.0,
     error_bound: 5e-4,
     border_cuts: true,
     steep_elsewhere: false,

@@ -79,6 +79,7 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     let stock = || ZMap::block(grid, settings.stock_top);
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.002 };
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 0.0005,
         most_cells: 1 << 22,
         most_squares: 1 << 22,

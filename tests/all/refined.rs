@@ -47,6 +47,7 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 32).unwrap();
     let stock = cut(ZMap::block(grid, ALLOWANCE), cutter, path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: ASKED,
         most_cells: cells,
         most_squares: 1 << 22,

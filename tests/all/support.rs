@@ -56,6 +56,7 @@ pub fn cut_and_measure(
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: ASKED,
         most_cells: 1 << 20,
         most_squares: 1 << 22,

@@ -4,7 +4,7 @@
 //! Enters: points, triangles, and for every corner its wedge ([`super::Sheets`]). Leaves: the same
 //! with more points, all on the facets given, and what stood at the wedges interpolated.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::{Bend, MeshFieldError, Sheets};
 use foldhash::fast::FixedState;
@@ -209,30 +209,22 @@ impl Refined {
     /// Exchanges diagonals of flat pairs of triangles that a Delaunay triangulation would not have.
     fn flip(&mut self) {
         for _ in 0..FLIP_ROUNDS {
-            let mut sides: Edges<(usize, usize)> =
-                Edges::with_capacity_and_hasher(3 * self.triangles.len(), FixedState::default());
-            for (t, corners) in self.triangles.iter().enumerate() {
-                for k in 0..3 {
-                    sides.insert((corners[k], corners[(k + 1) % 3]), (t, k));
-                }
-            }
+            let sides = Sides::of(&self.triangles, self.points.len());
+            let mut exchanged: HashSet<(u32, u32), FixedState> = HashSet::default();
             let mut touched = vec![false; self.triangles.len()];
-            let mut flipped = 0;
             for t in 0..self.triangles.len() {
                 for k in 0..3 {
                     let corners = self.triangles[t];
                     let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-                    let Some(&(n, l)) = sides.get(&(b, a)) else { continue };
-                    if touched[t] || touched[n] {
+                    let Some((n, l)) = sides.find(b, a).filter(|&(n, _)| !touched[t] && !touched[n]) else {
                         continue;
-                    }
+                    };
                     let d = self.triangles[n][(l + 2) % 3];
                     let (wt, wn) = (self.sheets.corners[t], self.sheets.corners[n]);
                     let one_sheet = wt[k] == wn[(l + 1) % 3] && wt[(k + 1) % 3] == wn[l];
-                    if !one_sheet || !self.gains([a, b, c, d]) || sides.contains_key(&(c, d)) {
-                        continue;
-                    }
-                    if sides.contains_key(&(d, c)) {
+                    let is_side =
+                        |from, to| sides.find(from, to).is_some() || exchanged.contains(&(from, to));
+                    if !one_sheet || !self.gains([a, b, c, d]) || is_side(c, d) || is_side(d, c) {
                         continue;
                     }
                     let (wa, wb, wc, wd) = (wt[k], wt[(k + 1) % 3], wt[(k + 2) % 3], wn[(l + 2) % 3]);
@@ -241,11 +233,10 @@ impl Refined {
                     self.triangles[n] = [d, b, c];
                     self.sheets.corners[n] = [wd, wb, wc];
                     (touched[t], touched[n]) = (true, true);
-                    sides.insert((c, d), (t, 2));
-                    flipped += 1;
+                    exchanged.insert((c, d));
                 }
             }
-            if flipped == 0 {
+            if exchanged.is_empty() {
                 break;
             }
         }
@@ -266,5 +257,63 @@ impl Refined {
         let ((cc, cs), (dc, ds)) = (angle(c), angle(d));
         let sine = cs * dc + cc * ds;
         flat && convex && sine < -FLIP_GAIN * cc.hypot(cs) * dc.hypot(ds)
+    }
+}
+
+/// The sides of triangles by the points that they begin at.
+struct Sides {
+    /// Where the sides of each point begin.
+    starts: Vec<usize>,
+    /// The point that a side ends at, its triangle, and its place there.
+    sides: Vec<(u32, u32, u8)>,
+}
+
+impl Sides {
+    /// Of triangles of so many points.
+    fn of(triangles: &[[u32; 3]], points: usize) -> Self {
+        let mut starts = vec![0; points + 1];
+        triangles.iter().flatten().for_each(|&from| starts[from as usize + 1] += 1);
+        (0..points).for_each(|p| starts[p + 1] += starts[p]);
+        let mut sides = vec![(0, 0, 0); 3 * triangles.len()];
+        let mut next = starts.clone();
+        for (t, corners) in (0u32..).zip(triangles) {
+            for k in 0..3 {
+                let slot = &mut next[corners[k] as usize];
+                sides[*slot] = (corners[(k + 1) % 3], t, k as u8);
+                *slot += 1;
+            }
+        }
+        Self { starts, sides }
+    }
+
+    /// The triangle that has a side from one point to another, and the place of that; the last of several.
+    fn find(&self, from: u32, to: u32) -> Option<(usize, usize)> {
+        let own = &self.sides[self.starts[from as usize]..self.starts[from as usize + 1]];
+        own.iter().rfind(|side| side.0 == to).map(|&(_, t, k)| (t as usize, k.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_are_found_by_their_ends() {
+        // Two triangles on one edge, and a third one that repeats a side of the first.
+        let triangles = [[0, 1, 2], [2, 1, 3], [0, 1, 4]];
+        let sides = Sides::of(&triangles, 5);
+        let brute = |from: u32, to: u32| {
+            let mut all = (0..triangles.len()).flat_map(|t| [0, 1, 2].map(|k| (t, k)));
+            all.rfind(|&(t, k)| [triangles[t][k], triangles[t][(k + 1) % 3]] == [from, to])
+        };
+        for from in 0..5 {
+            for to in 0..5 {
+                assert_eq!(sides.find(from, to), brute(from, to), "{from} {to}");
+            }
+        }
+        assert_eq!(
+            (sides.find(0, 1), sides.find(1, 2), sides.find(2, 1)),
+            (Some((2, 0)), Some((0, 1)), Some((1, 0)))
+        );
     }
 }

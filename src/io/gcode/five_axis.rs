@@ -20,7 +20,7 @@
 //! before the control begins to keep the tip, so that only Z is left to move. The same way round before
 //! rewinds, and up again at the end.
 
-use super::super::program_text::{ProgramHeader, describe, number, number_below, number_to};
+use super::super::program_text::{NO_MOVES, ProgramHeader, describe, number, number_below, number_to};
 use super::MoveLines;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
@@ -182,7 +182,10 @@ impl<'a> FiveAxisProgram<'a> {
                 self.line("G17 G21 G40 G49 G80 G90 G93")?;
             }
         }
-        match header.spindle_speed {
+        if self.path.is_empty() {
+            self.line(&format!("({NO_MOVES})"))?;
+        }
+        match header.speed_for(self.path) {
             Some(speed) => self.line(&format!("S{} M3", speed.round())),
             None => Ok(()),
         }
@@ -340,7 +343,7 @@ impl<'a> FiveAxisProgram<'a> {
         if self.post.style == Style::Full {
             self.line("G94")?;
         }
-        if header.spindle_speed.is_some() {
+        if header.speed_for(self.path).is_some() {
             self.line("M5")?;
         }
         self.line("M30")?;

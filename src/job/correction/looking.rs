@@ -30,6 +30,11 @@ pub(crate) struct Looked {
 }
 
 impl Looked {
+    /// What no cell sees, where it is that of the verdict, and the cell beside which it was measured, mm.
+    pub(super) fn beside_cells(self) -> Option<(Covered, f64)> {
+        self.covered.filter(|_| self.is_as_verdict).map(|covered| (covered, self.measured.cell))
+    }
+
     /// What stands where no cell sees, as far as it was cut.
     pub(super) fn unseen(&self) -> Option<&Measurement> {
         let unseen = self.covered.as_ref()?.unseen.as_ref()?;
@@ -70,19 +75,41 @@ impl Session {
         closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Looked, JobError> {
+        let mut looked = self.look_at_cells(request, earlier, engine, path, closeness, monitor)?;
+        self.look_beside_unless_failed(request, earlier, path, &mut looked, monitor)?;
+        Ok(looked)
+    }
+
+    /// Measures where no cell sees as well, unless what cells see fails for certain.
+    pub(super) fn look_beside_unless_failed(
+        &self,
+        request: &ToolpathRequest,
+        earlier: &[EarlierPath],
+        path: &Toolpath,
+        looked: &mut Looked,
+        monitor: &dyn Monitor,
+    ) -> Result<(), JobError> {
+        let fails = self.verdict_on(&looked.measured) == Verdict::Fail;
+        if fails { Ok(()) } else { self.look_beside_cells(request, earlier, path, looked, monitor) }
+    }
+
+    /// As [`Session::look`], without what no cell sees.
+    pub(super) fn look_at_cells(
+        &self,
+        request: &ToolpathRequest,
+        earlier: &[EarlierPath],
+        engine: &dyn Engine,
+        path: &Toolpath,
+        closeness: Closeness,
+        monitor: &dyn Monitor,
+    ) -> Result<Looked, JobError> {
         monitor.start("measuring a plan", 0);
         let (cutters, _) = self.tools(request);
         let whole = WholePath::new(earlier, path, &cutters, self.scene.machine.rapid_rate);
         let all = (&*whole.path, &whole.cutters);
         let MeasuredClosely { measured, is_as_verdict } =
             self.measure_closely(request, engine, all, closeness, monitor)?;
-        let fails = self.verdict_on(&measured) == Verdict::Fail;
-        let of_cells_alone = self.pocket.is_none();
-        let mut looked = Looked { measured, is_as_verdict, covered: None, of_cells_alone };
-        if !fails {
-            self.look_beside_cells(request, earlier, path, &mut looked, monitor)?;
-        }
-        Ok(looked)
+        Ok(Looked { measured, is_as_verdict, covered: None, of_cells_alone: self.pocket.is_none() })
     }
 
     /// Measures where no cell sees as well, unless that was done.

@@ -157,9 +157,8 @@ impl CorrectionRound {
     /// Whether this round takes a share worth another plan of what another one leaves highest above the target, or
     /// of the ridges that it leaves there.
     pub(super) fn takes_something(&self, other: &Self, goal: &Goal) -> bool {
-        let fewer = Goal { is_hopeless: true, ..*goal };
-        let lower = Goal { is_hopeless: false, ..*goal };
-        [lower, fewer].iter().any(|goal| self.takes(LEAST_GAIN, other, goal))
+        let takes = |is_hopeless: bool| self.takes(LEAST_GAIN, other, &Goal { is_hopeless, ..*goal });
+        takes(false) || takes(true) && other.over_target_fraction.is_some_and(|over| over > 0.0)
     }
 
     /// What a plan gains over the best one before it.

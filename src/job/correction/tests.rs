@@ -257,7 +257,7 @@ fn short_passes_that_cut_too_deep_give_way_to_the_plan_before_them() {
     let (request, target) = (&session.scene.toolpaths[0], 0.05);
     let (tool, engine) = (crate::tool::Tool::of(&request.tooling), session.engine(request).unwrap());
     let around = Around { tool: &tool, near: &session.part, fixtures: &[], rest: None };
-    let [before, mut deep] = [0, 1].map(|_| session.plan(request, around, None, &Silent).unwrap());
+    let [before, mut deep] = [0, 1].map(|_| session.plan(request, around, &Silent).unwrap());
     deep.plan.path = deep.plan.path.moved(geometry::Vector3::new(0.0, 0.0, -0.2));
     let (closeness, wanted) = (Closeness::Verdict, session.wanted(request, target, false));
     let looked = session.look(request, &[], engine, &deep.plan.path, closeness, &Silent).unwrap();

@@ -86,7 +86,7 @@ fn judged(run: &Run<'_>, unseen: &Unseen) -> Vec<Claim> {
                 micrometres(Some(limits.uncut)),
             );
         }
-        claim.text += ", measured along normals where no cell sees";
+        claim.text += judge::UNSEEN;
     }
     claims
 }

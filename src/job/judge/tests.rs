@@ -297,3 +297,28 @@ fn what_figures_found_comes_by_its_gravity_and_fails() {
     assert_eq!((verdict, kinds), (Verdict::Fail, vec!["collision", "wall", "gouge", "uncut", "scallop"]));
     assert_eq!(judged(&measurement(0.0), &STRICT).0, Verdict::Pass);
 }
+
+/// What cells and normals both find violated is one violation, with the greater figure and the other one beside it.
+#[test]
+fn a_violation_that_two_find_is_listed_once() {
+    let of = |depth: f64, suffix: &str| {
+        let mut claims = judged(&measurement(depth), &STRICT).1;
+        claims.iter_mut().for_each(|claim| claim.text += suffix);
+        claims
+    };
+    let gouges = |cells: f64, normals: f64| {
+        let both = [of(normals, UNSEEN), of(cells, "")].concat();
+        let (before, once) = (Verdict::by(&both), each_violation_once(both));
+        assert_eq!(before, Verdict::by(&once));
+        let is_gouge = |claim: &Claim| claim.what == "gouge" && claim.verdict() == Verdict::Fail;
+        once.into_iter().filter(is_gouge).map(|claim| claim.text).collect::<Vec<_>>()
+    };
+    let [deeper, less] = [gouges(0.05, 0.02), gouges(0.02, 0.05)];
+    assert!(deeper.len() == 1 && deeper[0].starts_with("gouge 50.0"), "{deeper:?}");
+    assert!(deeper[0].ends_with("; 20.0 ± 0.50 µm measured along normals where no cell sees"), "{deeper:?}");
+    assert!(less.len() == 1 && less[0].ends_with("; 20.0 ± 0.50 µm on the cells"), "{less:?}");
+    // What one of them finds stays as it is, and so does what holds.
+    assert_eq!(gouges(0.02, 0.001).len(), 1);
+    let held = [of(0.001, UNSEEN), of(0.001, "")].concat();
+    assert_eq!(each_violation_once(held.clone()), held);
+}

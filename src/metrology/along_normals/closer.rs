@@ -23,7 +23,7 @@ const MOST_DEPTH: u32 = 20;
 
 /// What is searched for, in this order.
 #[derive(Debug, Clone, Copy)]
-enum Figure {
+pub(crate) enum Figure {
     Depth,
     Ridge,
     Border,
@@ -31,7 +31,9 @@ enum Figure {
 }
 
 impl Figure {
-    const ALL: [Self; 4] = [Self::Depth, Self::Ridge, Self::Border, Self::Uncut];
+    pub(crate) const ALL: &[Self] = &[Self::Depth, Self::Ridge, Self::Border, Self::Uncut];
+    /// Where another toolpath cuts off what stands.
+    pub(crate) const GOUGES: &[Self] = &[Self::Depth];
 }
 
 /// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge, the
@@ -89,6 +91,8 @@ impl Possible {
 /// How closely figures are to be known.
 struct Wanted<'a> {
     limits: &'a Limits,
+    /// Which of them.
+    figures: &'static [Figure],
     /// Error bound that is asked for, mm.
     asked: f64,
 }
@@ -109,7 +113,7 @@ impl Wanted<'_> {
     }
 
     fn is_any_open(&self, possible: &Possible, greatest: &Greatest) -> bool {
-        Figure::ALL.into_iter().any(|figure| self.is_open(possible, figure, greatest))
+        self.figures.iter().any(|figure| self.is_open(possible, *figure, greatest))
     }
 }
 
@@ -165,10 +169,10 @@ impl Ord for Waiting {
 
 /// Keeps no more triangles than so many: of each figure the most promising ones. Returns what is possible in
 /// the others.
-fn keep_most_promising(open: &mut Vec<Open>, most: usize) -> Possible {
+fn keep_most_promising(open: &mut Vec<Open>, most: usize, figures: &[Figure]) -> Possible {
     let mut kept = 0;
-    for (turn, figure) in Figure::ALL.into_iter().enumerate() {
-        let share = (most - kept) / (Figure::ALL.len() - turn);
+    for (turn, &figure) in figures.iter().enumerate() {
+        let share = (most - kept) / (figures.len() - turn);
         let rest = &mut open[kept..];
         if share < rest.len() {
             rest.select_nth_unstable_by(share, |a, b| b.by_promise(a, figure));
@@ -398,7 +402,8 @@ impl NormalInspection<'_> {
     ) -> Result<Possible, Cancelled> {
         const BATCH: usize = 64;
         monitor.start("looking closer", 0);
-        let wanted = Wanted { limits: self.limits, asked };
+        let figures = self.figures;
+        let wanted = Wanted { limits: self.limits, figures, asked };
         // What promises little is not kept, but counts.
         let mut closed = Possible::NOTHING;
         let mut open: Vec<Open> = Vec::new();
@@ -411,14 +416,14 @@ impl NormalInspection<'_> {
             }
             // No more than so many will be divided.
             if open.len() > 2 * self.most_divided {
-                closed = closed.or(keep_most_promising(&mut open, self.most_divided));
+                closed = closed.or(keep_most_promising(&mut open, self.most_divided, figures));
             }
         }
-        closed = closed.or(keep_most_promising(&mut open, self.most_divided));
+        closed = closed.or(keep_most_promising(&mut open, self.most_divided, figures));
         let mut left = self.most_divided;
         // A second time with what is left of all shares.
-        for (turn, figure) in Figure::ALL.into_iter().enumerate().chain(Figure::ALL.into_iter().enumerate()) {
-            let mut share = left / (Figure::ALL.len() - turn);
+        for (turn, &figure) in figures.iter().enumerate().chain(figures.iter().enumerate()) {
+            let mut share = left / (figures.len() - turn);
             left -= share;
             let (waiting, mut others): (Vec<Open>, Vec<Open>) =
                 open.into_iter().partition(|open| wanted.is_open(&open.possible, figure, greatest));

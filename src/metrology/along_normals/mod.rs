@@ -36,6 +36,7 @@ use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::ridge_map::RidgeMap;
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
+pub(crate) use closer::Figure;
 use closer::{Greatest, MOST_DIVIDED};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
@@ -194,6 +195,8 @@ pub(crate) struct Along<'a> {
     pub asked: f64,
     /// Triangles that are divided at most in search of extremes.
     pub most_divided: usize,
+    /// Of which figures extremes are sought.
+    pub figures: &'static [Figure],
 }
 
 struct NormalInspection<'a> {
@@ -207,6 +210,7 @@ struct NormalInspection<'a> {
     /// Radius with which the widest cutter bends, about, mm.
     radius: f64,
     most_divided: usize,
+    figures: &'static [Figure],
 }
 
 /// Measures what `engine` tells of the cut by `path` at places `spacing` mm apart, looking closer until the
@@ -227,7 +231,8 @@ pub fn measure_along_normals(
     monitor: &dyn Monitor,
 ) -> Result<(Measurement, NormalMap), Cancelled> {
     let cutters = &Cutters::from(cutter);
-    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: MOST_DIVIDED };
+    let (most_divided, figures) = (MOST_DIVIDED, Figure::ALL);
+    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided, figures };
     let keep = |places: &[NetPlace]| are_judged(places, judged);
     let net = Net::over(part, spacing);
     let kept = keep(&net.places);
@@ -247,7 +252,8 @@ pub(crate) fn ridges_along_normals(
 ) -> Result<RidgeMap, Cancelled> {
     let Task { part, cutters, path, limits, .. } = *task;
     let asked = task.simulation.error_bound;
-    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: 0 };
+    let (most_divided, figures) = (0, Figure::ALL);
+    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided, figures };
     let net = Net::over(part, spacing);
     let kept = are_judged(&net.places, Some((&task.facing(), task.judged)));
     let is_kept = |t: &[u32; 3]| t.iter().all(|&k| kept[k as usize]);
@@ -279,13 +285,24 @@ struct Seen {
 
 impl Along<'_> {
     fn inspection<'a>(&'a self, tracks: &'a Tracks<'a>) -> NormalInspection<'a> {
-        let Self { part, cutters, path, engine, limits, spacing, most_divided, .. } = *self;
+        let Self { part, cutters, path, engine, limits, spacing, most_divided, figures, .. } = *self;
         let radius = cutters.greatest(|cutter| {
             let corner = cutter.corner_radius();
             if corner > 0.0 { corner } else { cutter.radius() }
         });
         let finder = Finder { part, engine, tracks, radius, close: CLOSE };
-        NormalInspection { part, cutters, path, engine, finder, limits, spacing, radius, most_divided }
+        NormalInspection {
+            part,
+            cutters,
+            path,
+            engine,
+            finder,
+            limits,
+            spacing,
+            radius,
+            most_divided,
+            figures,
+        }
     }
 
     /// Measures the places of a net that are `kept`, and of the contacts of the moves that come `near` those

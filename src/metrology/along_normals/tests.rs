@@ -111,6 +111,7 @@ fn a_look_at_ridges_alone_finds_their_heights_and_what_stands_along_borders() {
             spacing,
             asked,
             most_divided: 0,
+            figures: Figure::ALL,
         };
         let map = along.ridges(&net, &Silent).unwrap();
         let (max, p50) = (map.scallop.max_mm.unwrap(), map.scallop.p50_mm.unwrap());
@@ -580,6 +581,7 @@ fn the_two_moves_that_meet_tell_the_ridges_that_all_moves_do() {
                 spacing: 0.2,
                 asked: 1e-4,
                 most_divided: 0,
+                figures: Figure::ALL,
             };
             let kept = vec![true; net.places.len()];
             let seen = along.inspection(&tracks).look(&net, &kept, &Silent).unwrap();

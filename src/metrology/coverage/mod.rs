@@ -24,7 +24,7 @@ use geometry::{Point2, Point3, Vector3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
 
-use super::along_normals::{Along, AlongNormal as _, Net, NetPlace, Site, SweptVolume};
+use super::along_normals::{Along, AlongNormal as _, Figure, Net, NetPlace, Site, SweptVolume};
 use super::facing::{Facing, Judged, PlaceKind};
 use super::figures::{Limits, Measurement, RidgePlace};
 pub use figures::CoverageFigures;
@@ -88,6 +88,9 @@ pub struct AlongTask<'a> {
     pub finest: f64,
     /// How often the distance of places that suits the cells is halved.
     pub halvings: i32,
+    /// Whether another toolpath cuts off what stands: extremes are sought of gouges alone, and the bounds of
+    /// heights are wide.
+    pub leaves_the_rest: bool,
 }
 
 /// What stands on judged surface that no cell measures.
@@ -220,6 +223,7 @@ impl<'a> Coverage<'a> {
             spacing,
             asked: task.asked,
             most_divided: net.triangles.len(),
+            figures: if task.leaves_the_rest { Figure::GOUGES } else { Figure::ALL },
         };
         let near = Near::new(&net.places, spacing + task.cutters.greatest_radius());
         let comes_near = |k: usize| near.is_passed(task.path, k, task.cutters.of_move(k as u32));

@@ -214,7 +214,16 @@ fn unseen_of(
         shallow: 1e-6,
         block: block(part, margin),
     };
-    let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1, halvings };
+    let task = AlongTask {
+        cutters,
+        path,
+        cut: &cut,
+        limits: &LIMITS,
+        asked: 5e-4,
+        finest: 0.1,
+        halvings,
+        leaves_the_rest: false,
+    };
     let UnseenSurface { measurement, spacing, .. } =
         coverage.measure_unseen(&task, &Silent).unwrap().unwrap();
     (measurement, spacing)

@@ -92,6 +92,7 @@ impl Engine for Cells {
         let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {
             error_bound: task.simulation.error_bound,
+            allowed_depth: task.allowed_depth,
             most_cells,
             most_squares: task.budget.squares_beside(held, &grid),
             is_first_look: task.is_first_look,

@@ -57,6 +57,9 @@ pub struct Task<'a> {
     pub judged: Judged,
     /// Whether finer cells follow where this measurement leaves a limit open.
     pub is_first_look: bool,
+    /// A gouge that is shown to be no deeper than this, mm, need not be known as closely as the simulation is
+    /// asked for; 0 where all are to be.
+    pub allowed_depth: f64,
 }
 
 impl<'a> Task<'a> {

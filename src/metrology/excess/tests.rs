@@ -97,6 +97,7 @@ fn measured_holding(
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
     let cut = cut_reference(&ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 5e-4,
         most_cells: 1 << 20,
         most_squares,
@@ -241,6 +242,7 @@ fn cells_that_hold_more_than_a_height_are_told() {
             budget: Budget::new(&part, 64),
             judged: Judged::Facing,
             is_first_look: false,
+            allowed_depth: 0.0,
         };
         let brute = Brute::new(&part, cutters.first(), &path);
         let over = |k: usize| {

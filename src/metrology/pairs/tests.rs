@@ -50,6 +50,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
     let grid = Grid::covering(&part.bounds(), 0.07, 64, 1 << 30).unwrap();
     let cut = cut_reference(&ZMap::block(grid, 9.0), cutter, path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 5e-4,
         most_cells: 1 << 20,
         most_squares: 1 << 20,

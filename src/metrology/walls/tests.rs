@@ -66,6 +66,7 @@ fn measured_on(cell: f64, part: &Part, cutter: &Cutter, path: &Toolpath) -> Meas
     let grid = Grid::covering(&area, cell, 8, 1 << 30).unwrap();
     let cut = cut(ZMap::block(grid, area.max.z), cutter, path, &Silent).unwrap();
     let asked = Asked {
+        allowed_depth: 0.0,
         error_bound: 5e-4,
         border_cuts: true,
         steep_elsewhere: false,
