@@ -185,8 +185,8 @@ fn engaged_within(run: &Run<'_>, pocket: &EngagementFigures, limit: f64) -> Clai
     Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)
 }
 
-/// What two heights differ by at most for their last decimal, mm.
-const LAST_DECIMAL: f64 = 1e-4;
+/// What the coordinates of two points, as programs write them, are off their difference by at most, mm.
+const LAST_DECIMAL: f64 = 2.0 * motion::ROUNDING;
 
 /// Differences of heights, mm, and of slopes below which they are rounding.
 const ROUNDING: f64 = 1e-6;
@@ -251,12 +251,13 @@ fn steepest(
     };
     let mut found = (0.0, 0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
-        let slope = |drop: f64| drop.max(0.0).atan2((b - a).xy().norm()).to_degrees();
-        let at_least = slope(a.z - b.z - LAST_DECIMAL);
+        let (run, drop) = ((b - a).xy().norm(), a.z - b.z);
+        let slope = |drop: f64, run: f64| drop.max(0.0).atan2(run).to_degrees();
+        let at_least = slope(drop - LAST_DECIMAL - ROUNDING, run + LAST_DECIMAL * std::f64::consts::SQRT_2);
         let is_asked = || a.xy() == b.xy() || at_least > limit + ROUNDING;
         let cuts = || b.z < cleared(m.pass) - ROUNDING && (!is_asked() || stands(k));
         if m.kind == MoveKind::Plunge && at_least > found.1 && cuts() {
-            found = (slope(a.z - b.z), at_least, Some(k));
+            found = (slope(drop, run), at_least, Some(k));
         }
     }
     found
@@ -295,12 +296,29 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0, 3.0, &|_| true), (90.0, 90.0, Some(5)));
+        let plunge = steepest(&path, 0.0, 3.0, &|_| true);
+        assert!(plunge.0 == 90.0 && plunge.1 > 89.99 && plunge.2 == Some(5), "{plunge:?}");
         assert_eq!(steepest(&path, 0.0, 3.0, &|k| k < 3).2, Some(1));
         assert_eq!(steepest(&path, 0.0, 3.0, &|_| false).2, None);
         assert_eq!(steepest(&path, 0.0, 45.0, &|_| false).2, Some(1));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
         let (slope, _, index) = steepest(&ramped, 0.0, 3.0, &|_| true);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
+    }
+
+    /// Two places of a ramp that fall together once written: what their last decimals may have added is no
+    /// slope, but a drop of more is.
+    #[test]
+    fn the_last_decimals_of_a_ramp_are_no_slope() {
+        for (z, along, is_steep) in [(-0.6001, 0.0, false), (-0.6001, 1e-4, false), (-0.61, 1e-4, true)] {
+            let to = |x: f64, z: f64| {
+                let to = ClPoint::upright(Point3::new(x, 7.1234, z));
+                Move { to, kind: MoveKind::Plunge, feed_rate: 100.0, pass: 0 }
+            };
+            let moves = vec![to(0.0, 0.0), to(12.0, -0.6), to(12.0 + along, z), to(40.0, -2.0)];
+            let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 7.1234, 5.0)), moves);
+            let (_, at_least, _) = steepest(&path, 0.0, 3.0, &|_| true);
+            assert_eq!(at_least > 3.0, is_steep, "{z} {along}: {at_least}");
+        }
     }
 }

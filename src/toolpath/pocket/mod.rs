@@ -177,7 +177,7 @@ pub fn plan_pocket(
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
-    let path = descend::program(&runs, pocket.depth, strategy, settings);
+    let path = descend::program(&runs, [pocket.depth, radius], strategy, settings);
     let Planner { mut planned, bounding, rules, .. } = planner;
     if rules.is_some() {
         tell_bounding(&bounding, &mut planned.notes);
