@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use metrology::{EngagementFigures, ExceedingStretch, PocketFigures, StockBefore, View};
+use metrology::{EngagementFigures, ExceedingStretch, Judged, PocketFigures, StockBefore, View};
 use motion::{MoveKind, Toolpath};
-use report::{Claim, Figure, FigureTable, Gravity, WALL, micrometres, with_bound};
+use report::{Claim, Figure, FigureTable, Gravity, WALL, beside_limit, micrometres, with_bound};
 use toolpath::{Pocket, PocketStrategy};
 use work::monitor::Monitor;
 
 use super::words::value;
 use crate::JobError;
-use crate::pocket::{engagement_figures, pocket_figures};
+use crate::pocket::{OutOfReach, engagement_figures, out_of_reach, pocket_figures};
 use crate::run::{Finding, Run};
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
@@ -20,6 +20,10 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let path = run.path();
     let mut p = pocket_figures(run.session, pocket, path, run.tools, cut, monitor)?;
     let mut claims = vec![within_walls(run, &p), cut_to_walls(run, &p)];
+    if run.scene().judged == Judged::All {
+        let all = (&*run.whole.path, &run.whole.cutters);
+        claims.push(cut_everywhere(run, &out_of_reach(run.session, pocket, all, cut, monitor)?));
+    }
     let strategy = run.request.strategy.downcast_ref::<PocketStrategy>();
     if let (Some(strategy), Some(engaged)) = (strategy, &run.planned.engaged) {
         let (step, radius) = (run.request.step, run.tooling().cutter.radius());
@@ -49,7 +53,7 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
             format!("{} µm", with_bound(Some(p.wall_gouge_mm), Some(p.wall_gouge_error_bound_mm))),
         ),
         ("left on the walls", format!("{} µm", thickness(p))),
-        ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
+        ("out of reach of the cutter", format!("{:.3} mm²", p.unreachable_area_mm2)),
     ];
     let engaged = p.engagement.as_ref().map(|engaged| engagement_rows(engaged));
     let [engaged, thinly] = engaged.unwrap_or_default();
@@ -163,6 +167,30 @@ fn cut_to_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     // Where no move comes near it stands as far as was looked.
     let at_least = (!bound.is_finite()).then_some(measured - off(run));
     Claim { at_least, ..Claim::length("uncut", Gravity::Finish, limit, measured, bound) }.told(text)
+}
+
+/// That nothing stands where the cutter does not reach.
+fn cut_everywhere(run: &Run<'_>, found: &OutOfReach) -> Claim {
+    let limit = run.scene().tolerance.uncut;
+    let OutOfReach { area, height, at_least, at_most, at } = *found;
+    let bound = (at_most - height).max(0.0);
+    let text = match at {
+        Some(at) => format!(
+            "uncut material {} µm high (limit {}) at x {:.3} y {:.3}, in {area:.3} mm² that the cutter does not reach: corners, \
+             or places narrower than it",
+            beside_limit(height, bound, limit),
+            micrometres(Some(limit)),
+            at.x,
+            at.y
+        ),
+        None => format!(
+            "what the cutter does not reach is no thicker than {} µm (limit {})",
+            micrometres(Some(bound)),
+            micrometres(Some(limit))
+        ),
+    };
+    Claim { at_least: Some(at_least), ..Claim::length("uncut", Gravity::Finish, limit, height, bound) }
+        .told(text)
 }
 
 /// That passes keep to the engagement that the scene asks for.

@@ -162,7 +162,7 @@ pub fn plan_pocket(
     }
     let rest = pocket.rest_area(cutter, monitor)?;
     planner.planned.notes.push(format!(
-        "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
+        "{rest:.3} mm² of {:.1} mm² are out of the cutter's reach: corners, or places narrower than it",
         pocket.region.area()
     ));
     clearing.extend(planner.kept(groups)?);
@@ -272,7 +272,9 @@ impl Planner<'_> {
 
 /// Notes what kept the engagement to the limit, and where nothing did.
 fn tell_bounding(bounded::Bounding { loops, above }: &bounded::Bounding, notes: &mut Vec<String>) {
-    notes.push(format!("{loops} loops in each step down bound the engagement"));
+    if *loops > 0 {
+        notes.push(format!("{loops} loops in each step down bound the engagement"));
+    }
     if let Some((place, longest)) = above.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         let all: f64 = above.iter().map(|stretch| stretch.1).sum();
         notes.push(format!(

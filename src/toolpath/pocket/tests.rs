@@ -398,6 +398,33 @@ fn directions_across_do_not_run_along_walls() {
 
 /// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and
 /// streamlines traced by Runge and Kutta's method stay on them within the chord tolerance.
+/// No function with one value along the wall follows both sides of a slot. Passes then end at walls, which a
+/// note tells, and clear it.
+#[test]
+fn streamlines_of_a_slot_end_at_its_walls() {
+    let cutter = Cutter::flat(6.0).unwrap();
+    let side = |x: f64, from: f64| {
+        let at = move |k: i32| from + PI * f64::from(k) / 48.0;
+        (0..=48).map(move |k| Point2::new(x + 4.0 * at(k).cos(), 4.0 * at(k).sin()))
+    };
+    let slot = pocket(vec![side(40.0, -0.5 * PI).chain(side(0.0, 0.5 * PI)).collect()]);
+    let along = FeedDirection::Border(Sense::Along);
+    let vectors =
+        Vectors { direction: along, direction_weight: 1.0, along_walls: true, lines: Lines::Levels };
+    let strategy = strategy(Pattern::Streamline(vectors));
+    let plan = plan_pocket(&slot, &cutter, &strategy, &settings(), &Silent).unwrap();
+    assert!(plan.notes.iter().any(|note| note.contains("along_walls = false")), "{:?}", plan.notes);
+    let cuts = plan.path.segments().filter(|(.., m)| m.kind == MoveKind::Cut);
+    let passes: Vec<[Point2; 2]> = cuts.map(|(a, b, _)| [a.xy(), b.xy()]).collect();
+    for k in 0..400 {
+        let q = Point2::new(-3.9 + 0.12 * f64::from(k), 3.9 * (0.7 * f64::from(k)).sin());
+        if slot.reachable_floor(&cutter, 0.02).contains(&q) {
+            let near = passes.iter().any(|[a, b]| geometry::distance_to_segment(&q, a, b) <= 3.0 + 1e-3);
+            assert!(near, "{q}");
+        }
+    }
+}
+
 #[test]
 fn streamlines_around_an_island_are_the_traced_ones() {
     let pocket = pocket(vec![disc(0.0, 0.0, 30.0), disc(0.0, 0.0, 6.0)]);
