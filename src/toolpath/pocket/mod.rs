@@ -134,14 +134,15 @@ pub fn plan_pocket(
         planned.notes.extend(feed_check(&vectors.direction, &Aabb { min: low, max: high }, &[domain])?);
     }
     let air = Air::of(pocket, radius);
+    let step = strategy.stepover(settings.step, radius);
     let mut ground = Cleared::new(around, radius);
     ground.gentle.clone_from(&strategy.gentle);
     air.iter().flat_map(|air| &air.discs).for_each(|p| ground.add(*p));
     let mut planner = Planner {
         cutter,
         strategy,
-        step: strategy.stepover(settings.step, radius),
-        rules: strategy.rules(radius, pocket.depth),
+        step,
+        rules: strategy.rules(step, cutter, pocket.depth),
         air,
         ground,
         bounding: bounded::Bounding::default(),
