@@ -1,17 +1,17 @@
 //! What is measured of a scene's pocket.
 
 use cutter::Cutter;
-use geometry::{Region, RegionIndex};
+use geometry::{Point2, Region, RegionIndex};
 use metrology::{
     ContactArcs, EngagementFigures, ExceedingStretch, PocketFigures, THIN_LAYER, ThinLayers, UNCOUNTED_LAYER,
     WallGouge, WallMaterial, WallSearch, radius_below, stock_beside, wall_gouge_of_cells,
     wall_gouge_of_moves,
 };
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use scene::unmeasured_beside_walls;
-use sim::ZMap;
+use sim::{Envelope, ZMap};
 use toolpath::{Engagement, Exceeding, Pocket, PocketStrategy, Step, engagement, limit_feed};
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 use super::Session;
 use super::tool::ToolMoves;
@@ -77,6 +77,106 @@ pub(crate) fn pocket_figures(
         wall_uncut_at_mm: left.at.map(Into::into),
         engagement: None,
     })
+}
+
+/// What stands on the floor of a pocket where its cutter does not reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OutOfReach {
+    /// Area of such floor, mm², but for what is nearer to walls than is measured; 0 where there is none.
+    pub area: f64,
+    /// How high material stands over one of its places, mm, the highest of those that were looked at.
+    pub height: f64,
+    /// What stands there for certain, mm.
+    pub at_least: f64,
+    /// No place is higher, mm: floor beside walls counts as far as its material is from them.
+    pub at_most: f64,
+    /// That place in the plan view.
+    pub at: Option<Point2>,
+}
+
+/// Places of floor out of reach that are looked at, and pieces of it whose middle is.
+const MOST_PLACES: usize = 500;
+const MOST_PIECES: usize = 50;
+
+/// Precision of those middles, mm.
+const MIDDLE: f64 = 0.01;
+
+/// What `whole` a path of all tools leaves where the scene's cutter does not reach.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(crate) fn out_of_reach(
+    session: &Session,
+    pocket: &Pocket,
+    (path, cutters): (&Toolpath, &Cutters),
+    cut: &ZMap,
+    monitor: &dyn Monitor,
+) -> Result<OutOfReach, Cancelled> {
+    let cutter = &session.scene.tooling.cutter;
+    let clear = unmeasured_beside_walls(session.scene.tolerance.chord, cutter.radius());
+    let strip = clear + 4.0 * Region::offset_excess(cutter.radius()) + pocket.off_drawing;
+    let region = pocket.out_of_reach(cutter, [clear, strip]);
+    let mut found = OutOfReach {
+        area: region.area(),
+        height: 0.0,
+        at_least: 0.0,
+        at_most: strip.min(pocket.depth),
+        at: None,
+    };
+    if region.is_empty() {
+        return Ok(found);
+    }
+    let stock = |q: &Point2| cut.shape.as_ref().map_or(cut.top, |shape| shape.height_at(q.x, q.y));
+    found.at_most = pocket.depth + session.top();
+    let corners: Vec<Point2> = region.curves().flatten().copied().collect();
+    let mut places: Vec<Point2> =
+        corners.iter().step_by(corners.len().div_ceil(MOST_PLACES)).copied().collect();
+    // Of equals the last is told: the middle of the largest.
+    let mut pieces: Vec<Region> =
+        region.pieces.iter().map(|piece| Region { pieces: vec![piece.clone()] }).collect();
+    pieces.sort_by(|a, b| a.area().total_cmp(&b.area()));
+    for piece in &pieces[pieces.len().saturating_sub(MOST_PIECES)..] {
+        places.extend(piece.largest_disc(MIDDLE, monitor)?.map(|disc| disc.0));
+    }
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let envelope = Envelope::new(cutters.clone(), path);
+    let over = |envelope: &Envelope, q: &Point2| {
+        let cut = envelope.lowest(q.x, q.y, &all).map_or(f64::INFINITY, |lowest| lowest.0);
+        (cut.min(stock(q)) + pocket.depth).max(0.0)
+    };
+    let heights = work::parallel::try_map(places.len(), |k| {
+        monitor::check(monitor)?;
+        Ok(over(&envelope, &places[k]))
+    })?;
+    let highest = heights.iter().zip(&places).max_by(|a, b| a.0.total_cmp(b.0));
+    if let Some((&height, at)) = highest {
+        // A tool that strays cuts no more than a larger one on the path.
+        let strays = path.origin.strays;
+        let at_least = if strays > 0.0 {
+            grown(cutters, strays)
+                .map_or(0.0, |(cutters, below)| (over(&Envelope::new(cutters, path), at) - below).max(0.0))
+        } else {
+            height
+        };
+        found = OutOfReach { height, at_least, at: Some(*at), ..found };
+    }
+    Ok(found)
+}
+
+/// Cutters that are larger on all sides by a distance, mm, and how far the tip of one is lower at most;
+/// `None` where one grows beyond the size of cutters.
+fn grown(cutters: &Cutters, by: f64) -> Option<(Cutters, f64)> {
+    let mut all: Option<Cutters> = None;
+    let mut most = 0.0f64;
+    for (first, cutter) in cutters.each() {
+        let (cutter, below) = cutter.grown(by).ok()?;
+        most = most.max(below);
+        all = Some(match all {
+            None => cutter.into(),
+            Some(before) => before.then(first, cutter),
+        });
+    }
+    all.map(|all| (all, most))
 }
 
 /// The tool with the least radius, by which walls are reached.

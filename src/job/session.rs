@@ -76,9 +76,15 @@ fn stock_of(
             // The measured floor ends where the flat of the cutter's bottom does.
             let beyond =
                 pocket.map_or(0.0, |_| scene.tooling.cutter.radius() - scene.tooling.cutter.flat_radius());
-            let margin = margin + beyond;
             let face = pocket.map_or(max.z, |_| 0.0);
-            min -= Vector3::new(margin, margin, BASE);
+            min -= Vector3::new(beyond, beyond, BASE);
+            max += Vector3::new(beyond, beyond, 0.0);
+            // What the cutter does not reach stands in the block as well.
+            if let Some([low, high]) = pocket.and_then(|pocket| pocket.region.bounds()) {
+                (min.x, min.y) = (min.x.min(low.x), min.y.min(low.y));
+                (max.x, max.y) = (max.x.max(high.x), max.y.max(high.y));
+            }
+            min -= Vector3::new(margin, margin, 0.0);
             max += Vector3::new(margin, margin, 0.0);
             max.z = face + allowance;
             let block = Aabb { min, max };

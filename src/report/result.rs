@@ -109,6 +109,14 @@ impl ToolpathResult {
         let coverage = self.figures.iter().find(|figure| figure.key == "coverage");
         coverage.and_then(|figure| figure.value.get("scope")?.as_str()).unwrap_or_default()
     }
+
+    /// That share as a number; 1 where it is not known.
+    pub fn share(&self) -> f64 {
+        let coverage = self.figures.iter().find(|figure| figure.key == "coverage");
+        let area = |key: &str| coverage.and_then(|figure| figure.value.get(key)?.as_f64());
+        let shared = area("judged_mm2").zip(area("surface_mm2")).filter(|areas| areas.1 > 0.0);
+        shared.map_or(1.0, |(judged, surface)| judged / surface)
+    }
 }
 
 /// Claims as lists, one for each verdict.

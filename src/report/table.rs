@@ -260,7 +260,7 @@ pub fn conclusion(report: &RunReport) -> String {
             scope => format!("Every tolerance holds {scope}."),
         },
         (Some(best), all) => {
-            let hold = format!("{passing} of {all} toolpaths hold every tolerance.");
+            let hold = format!("{passing} of {all} toolpaths hold every tolerance{}.", least_scope(report));
             let is_best = |t: &ToolpathReport| t.measured().is_some_and(|t| t.name == best.name);
             match report.chains().find(|chain| chain.last().is_some_and(is_best)) {
                 Some(chain) if chain.len() < all => {
@@ -271,6 +271,19 @@ pub fn conclusion(report: &RunReport) -> String {
                 _ => hold,
             }
         }
+    }
+}
+
+/// ` on 18 % of the surface or more`, where the verdict on one that passes does not cover all.
+fn least_scope(report: &RunReport) -> String {
+    let passing: Vec<_> = report.measured().filter(|t| t.verdict == Verdict::Pass).collect();
+    let Some(least) = passing.iter().min_by(|a, b| a.share().total_cmp(&b.share())) else {
+        return String::new();
+    };
+    let or_more = if passing.iter().any(|t| t.share() > least.share()) { " or more" } else { "" };
+    match least.scope().split(';').next().unwrap_or_default() {
+        "" => String::new(),
+        scope => format!(" {scope}{or_more}"),
     }
 }
 

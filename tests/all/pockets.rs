@@ -68,6 +68,41 @@ fn arcs_of_a_program_stay_at_the_moves() {
     assert!(found[0] > 1e-4, "an arc is no move");
 }
 
+/// With `judge = "all"` a neck and corners that no cutter reaches fail with their whole height, and all of the
+/// surface is judged; a hole as round as the drawing's chords passes. By default both pass, for the share of
+/// the surface that the cutter reaches.
+#[test]
+fn what_no_cutter_reaches_fails_where_all_is_judged() {
+    let home = tempfile::tempdir().unwrap();
+    let neck = "[[0, 0], [20, 0], [20, 10], [40, 10], [40, 0], [60, 0], [60, 20], [40, 20], [40, 14], [20, 14], [20, 20], [0, 20]]";
+    let turn = |k: i32| std::f64::consts::TAU * f64::from(k) / 240.0;
+    let round = (0..240).map(|k| [9.0 * turn(k).cos(), 9.0 * turn(k).sin()]).collect::<Vec<_>>();
+    let round = format!("{round:?}");
+    let text = |outline: &str, judge: &str| {
+        format!(
+            "[part]\nsurface = \"pocket\"\noutline = {outline}\ndepth = 5\n{judge}[cutter]\nshape = \"flat\"\ndiameter = 6\n\
+             [tolerance]\nchord = 0.005\n[[toolpath]]\nstrategy = \"pocket-offset\"\n"
+        )
+    };
+    let all = "judge = \"all\"\n";
+    let share = |toolpath: &Value| {
+        let area = |key: &str| toolpath["coverage"][key].as_f64().unwrap();
+        area("judged_mm2") / area("surface_mm2")
+    };
+    let (code, toolpath) = judged(home.path(), &text(neck, all));
+    let violated = violations(&toolpath);
+    let said = "uncut material 5000 ± 0.00 µm high (limit 50.0) at x 2";
+    assert!(code == Some(1) && violated.len() == 1 && violated[0].starts_with(said), "{violated:?}");
+    assert!((share(&toolpath) - 1.0).abs() < 1e-12);
+    let map = fs::read(home.path().join("out/pocket-offset/height.png")).unwrap();
+    let size = |at: usize| u32::from_be_bytes(map[at..at + 4].try_into().unwrap());
+    assert!(size(16) > 2 * size(20), "{} {}", size(16), size(20));
+    let (code, toolpath) = judged(home.path(), &text(neck, ""));
+    assert!(code == Some(0) && share(&toolpath) < 0.8, "{}", share(&toolpath));
+    let (code, toolpath) = judged(home.path(), &text(&round, all));
+    assert_eq!((code, share(&toolpath)), (Some(0), 1.0), "{:?}", violations(&toolpath));
+}
+
 /// Sides on the edge of the stock are as open as those that are listed: the same passes.
 #[test]
 fn sides_at_the_edge_of_the_stock_are_open() {

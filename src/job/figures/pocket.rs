@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use metrology::{EngagementFigures, ExceedingStretch, PocketFigures, StockBefore, View};
+use metrology::{EngagementFigures, ExceedingStretch, Judged, PocketFigures, StockBefore, View};
 use motion::{MoveKind, Toolpath};
-use report::{Claim, Figure, FigureTable, Gravity, WALL, micrometres, with_bound};
+use report::{Claim, Figure, FigureTable, Gravity, WALL, beside_limit, micrometres, with_bound};
 use toolpath::{Pocket, PocketStrategy};
 use work::monitor::Monitor;
 
 use super::words::value;
 use crate::JobError;
-use crate::pocket::{engagement_figures, pocket_figures};
+use crate::pocket::{OutOfReach, engagement_figures, out_of_reach, pocket_figures};
 use crate::run::{Finding, Run};
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
@@ -20,6 +20,10 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let path = run.path();
     let mut p = pocket_figures(run.session, pocket, path, run.tools, cut, monitor)?;
     let mut claims = vec![within_walls(run, &p), cut_to_walls(run, &p)];
+    if run.scene().judged == Judged::All {
+        let all = (&*run.whole.path, &run.whole.cutters);
+        claims.push(cut_everywhere(run, &out_of_reach(run.session, pocket, all, cut, monitor)?));
+    }
     let strategy = run.request.strategy.downcast_ref::<PocketStrategy>();
     if let (Some(strategy), Some(engaged)) = (strategy, &run.planned.engaged) {
         let (step, radius) = (run.request.step, run.tooling().cutter.radius());
@@ -49,7 +53,7 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
             format!("{} µm", with_bound(Some(p.wall_gouge_mm), Some(p.wall_gouge_error_bound_mm))),
         ),
         ("left on the walls", format!("{} µm", thickness(p))),
-        ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
+        ("out of reach of the cutter", format!("{:.3} mm²", p.unreachable_area_mm2)),
     ];
     let engaged = p.engagement.as_ref().map(|engaged| engagement_rows(engaged));
     let [engaged, thinly] = engaged.unwrap_or_default();
@@ -165,6 +169,30 @@ fn cut_to_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     Claim { at_least, ..Claim::length("uncut", Gravity::Finish, limit, measured, bound) }.told(text)
 }
 
+/// That nothing stands where the cutter does not reach.
+fn cut_everywhere(run: &Run<'_>, found: &OutOfReach) -> Claim {
+    let limit = run.scene().tolerance.uncut;
+    let OutOfReach { area, height, at_least, at_most, at } = *found;
+    let bound = (at_most - height).max(0.0);
+    let text = match at {
+        Some(at) => format!(
+            "uncut material {} µm high (limit {}) at x {:.3} y {:.3}, in {area:.3} mm² that the cutter does not reach: corners, \
+             or places narrower than it",
+            beside_limit(height, bound, limit),
+            micrometres(Some(limit)),
+            at.x,
+            at.y
+        ),
+        None => format!(
+            "what the cutter does not reach is no thicker than {} µm (limit {})",
+            micrometres(Some(bound)),
+            micrometres(Some(limit))
+        ),
+    };
+    Claim { at_least: Some(at_least), ..Claim::length("uncut", Gravity::Finish, limit, height, bound) }
+        .told(text)
+}
+
 /// That passes keep to the engagement that the scene asks for.
 fn engaged_within(run: &Run<'_>, pocket: &EngagementFigures, limit: f64) -> Claim {
     let (measured, index) = (pocket.max_engagement_deg, pocket.max_engagement_move);
@@ -185,8 +213,8 @@ fn engaged_within(run: &Run<'_>, pocket: &EngagementFigures, limit: f64) -> Clai
     Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)
 }
 
-/// What two heights differ by at most for their last decimal, mm.
-const LAST_DECIMAL: f64 = 1e-4;
+/// What the coordinates of two points, as programs write them, are off their difference by at most, mm.
+const LAST_DECIMAL: f64 = 2.0 * motion::ROUNDING;
 
 /// Differences of heights, mm, and of slopes below which they are rounding.
 const ROUNDING: f64 = 1e-6;
@@ -251,12 +279,13 @@ fn steepest(
     };
     let mut found = (0.0, 0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
-        let slope = |drop: f64| drop.max(0.0).atan2((b - a).xy().norm()).to_degrees();
-        let at_least = slope(a.z - b.z - LAST_DECIMAL);
+        let (run, drop) = ((b - a).xy().norm(), a.z - b.z);
+        let slope = |drop: f64, run: f64| drop.max(0.0).atan2(run).to_degrees();
+        let at_least = slope(drop - LAST_DECIMAL - ROUNDING, run + LAST_DECIMAL * std::f64::consts::SQRT_2);
         let is_asked = || a.xy() == b.xy() || at_least > limit + ROUNDING;
         let cuts = || b.z < cleared(m.pass) - ROUNDING && (!is_asked() || stands(k));
         if m.kind == MoveKind::Plunge && at_least > found.1 && cuts() {
-            found = (slope(a.z - b.z), at_least, Some(k));
+            found = (slope(drop, run), at_least, Some(k));
         }
     }
     found
@@ -295,12 +324,29 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0, 3.0, &|_| true), (90.0, 90.0, Some(5)));
+        let plunge = steepest(&path, 0.0, 3.0, &|_| true);
+        assert!(plunge.0 == 90.0 && plunge.1 > 89.99 && plunge.2 == Some(5), "{plunge:?}");
         assert_eq!(steepest(&path, 0.0, 3.0, &|k| k < 3).2, Some(1));
         assert_eq!(steepest(&path, 0.0, 3.0, &|_| false).2, None);
         assert_eq!(steepest(&path, 0.0, 45.0, &|_| false).2, Some(1));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
         let (slope, _, index) = steepest(&ramped, 0.0, 3.0, &|_| true);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
+    }
+
+    /// Two places of a ramp that fall together once written: what their last decimals may have added is no
+    /// slope, but a drop of more is.
+    #[test]
+    fn the_last_decimals_of_a_ramp_are_no_slope() {
+        for (z, along, is_steep) in [(-0.6001, 0.0, false), (-0.6001, 1e-4, false), (-0.61, 1e-4, true)] {
+            let to = |x: f64, z: f64| {
+                let to = ClPoint::upright(Point3::new(x, 7.1234, z));
+                Move { to, kind: MoveKind::Plunge, feed_rate: 100.0, pass: 0 }
+            };
+            let moves = vec![to(0.0, 0.0), to(12.0, -0.6), to(12.0 + along, z), to(40.0, -2.0)];
+            let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 7.1234, 5.0)), moves);
+            let (_, at_least, _) = steepest(&path, 0.0, 3.0, &|_| true);
+            assert_eq!(at_least > 3.0, is_steep, "{z} {along}: {at_least}");
+        }
     }
 }

@@ -44,18 +44,20 @@ pub struct CoverageFigures {
 
 impl CoverageFigures {
     /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all
-    /// of it, and the bound of their errors, mm².
+    /// of it, and the bound of their errors, mm². Where all is judged, moves tell the rest, too.
     pub fn of_pocket(
         judge: Judged,
         [floor, whole_floor]: [f64; 2],
         [walls, all_walls]: [f64; 2],
         error_bound_mm2: f64,
     ) -> Self {
+        let rest = (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0);
+        let (by_moves, out_of_reach) = if judge == Judged::All { (rest, 0.0) } else { (0.0, rest) };
         Self {
             judge,
             by_cells_mm2: floor,
-            by_moves_mm2: walls,
-            out_of_reach_mm2: (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0),
+            by_moves_mm2: walls + by_moves,
+            out_of_reach_mm2: out_of_reach,
             error_bound_mm2,
             ..Self::default()
         }
@@ -140,6 +142,8 @@ mod tests {
         let pocket = CoverageFigures::of_pocket(Judged::Facing, [90.0, 100.0], [50.0, 55.0], 0.5);
         assert_eq!((pocket.surface_mm2, pocket.judged_mm2), (155.0, 140.0));
         assert!(pocket.scope.ends_with("out of the cutter's reach 15.0 mm²"), "{}", pocket.scope);
+        let pocket = CoverageFigures::of_pocket(Judged::All, [90.0, 100.0], [50.0, 55.0], 0.5);
+        assert_eq!((pocket.surface_mm2, pocket.judged_mm2, &*pocket.scope), (155.0, 155.0, ""));
         assert_eq!(CoverageFigures::default().share(), 0.0);
     }
 }

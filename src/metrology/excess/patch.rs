@@ -26,8 +26,9 @@ const MOST_BESIDE: usize = 16;
 /// Heights that differ by less, mm, are one level.
 const LEVEL: f64 = 1e-9;
 
-/// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of
-/// thousands of squares.
+/// Where more moves than this may cut, not all of them are asked in a square as large as a cell: each takes
+/// some 5 ns, in hundreds of thousands of squares. In smaller ones that nothing else decides, more are, and
+/// in the smallest all.
 const MOST_ASKED: usize = 4096;
 
 /// Moves that are found to have cut away what seems to stand on a place, one after the other.
@@ -103,6 +104,8 @@ struct Clipped {
     below: f64,
     /// Least cosine between normals in the polygon and that of the plane.
     cosine: f64,
+    /// Where more moves may cut, not all of them are asked.
+    most_asked: usize,
 }
 
 /// Evaluates squares.
@@ -122,10 +125,12 @@ impl Patches<'_> {
         let small = half < CORNER_SHARE * self.inspection.grid.cell;
         let most = if small { usize::MAX } else { MOST_TRIANGLES };
         let Some(triangles) = self.triangles(centre, half, most) else { return Held::Unknown };
+        let share = 0.5 * self.inspection.grid.cell / half;
+        let most_asked = if small { usize::MAX } else { (MOST_ASKED as f64 * share) as usize };
         let mut held: Option<(f64, Point2, f64, u32)> = None;
         for &t in &triangles {
             for outline in outlines(self.inspection.part, t, centre, half).into_iter().flatten() {
-                let Some(piece) = self.piece(t, outline) else { continue };
+                let Some(piece) = self.piece(t, outline, most_asked) else { continue };
                 let Some((possible, here, by)) = self.above(&piece, half, small) else {
                     if half < LEAST_HALF && self.ends_beside(centre) {
                         continue;
@@ -229,7 +234,7 @@ impl Patches<'_> {
     }
 
     /// The design within a polygon of a triangle, where it is seen from above.
-    fn piece(&self, t: usize, outline: Outline) -> Option<Clipped> {
+    fn piece(&self, t: usize, outline: Outline, most_asked: usize) -> Option<Clipped> {
         let part = self.inspection.part;
         let (first, normal) = (part.mesh().corners(t)[0], part.mesh().normal(t));
         let height =
@@ -259,7 +264,7 @@ impl Patches<'_> {
         let inside = |corner: &Point2| own(&(corner + (middle - corner) * 1e-3)).0;
         let foot = std::iter::once(foot).chain(corners[..len].iter().map(inside)).find(is_seen)?;
         let leans = [foot.normal.xy(); MOST_CORNERS];
-        let mut piece = Clipped { corners, len, leans, foot, below: 0.0, cosine: 1.0 };
+        let mut piece = Clipped { corners, len, leans, foot, below: 0.0, cosine: 1.0, most_asked };
         if !part.patches().is_empty() {
             piece.bend(&|corner| own(corner).0);
             let turned = (2.0 * (1.0 - piece.cosine)).sqrt();
@@ -296,7 +301,7 @@ impl Patches<'_> {
         let hidden = self.hidden(point, normal);
         let shown = self.above_with(piece, half, hidden.clone(), None);
         let is_wall = |possible: f64, here: f64| possible > self.wall_over(here, half);
-        let stands = |here: f64| here <= self.least || self.cut_away_below(&piece.foot, here).is_none();
+        let stands = |here: f64| here <= self.least || self.cut_away_below(piece, here).is_none();
         if shown.is_some_and(|(possible, here, _)| stands(here) && !(small && is_wall(possible, here))) {
             return shown;
         }
@@ -307,12 +312,18 @@ impl Patches<'_> {
         [shown, by_all].into_iter().flatten().reduce(least)
     }
 
-    /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where
+    /// The move that cut away what seems to stand so high, mm, over the foot of a piece; `None` also where
     /// there are too many to ask.
-    fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
-        let every_move = self.inspection.every_move?;
-        let place = (foot.point + foot.normal * height).xy();
-        if every_move.over(place).len() > MOST_ASKED { None } else { every_move.cuts_away_over(foot, height) }
+    fn cut_away_below(&self, piece: &Clipped, height: f64) -> Option<u32> {
+        let foot = &piece.foot;
+        self.asked(piece, (foot.point + foot.normal * height).xy())?;
+        self.inspection.every_move?.cuts_away_over(foot, height)
+    }
+
+    /// All moves that may cut at a place by a piece; `None` where there are too many to ask.
+    fn asked(&self, piece: &Clipped, q: Point2) -> Option<&[u32]> {
+        let all = self.inspection.every_move?.over(q);
+        (all.len() <= piece.most_asked).then_some(all)
     }
 
     /// What stands higher in a square than this, on a foot where so much stands, stands behind a wall.
@@ -327,10 +338,7 @@ impl Patches<'_> {
         let q = piece.foot.point.xy() + piece.foot.normal.xy() * height;
         // What passes above the stock cuts nothing.
         let over = |&by: &u32| Some((envelope.height(by, q.x, q.y).filter(|z| *z < self.stock_top)?, by));
-        let all = self.inspection.every_move?.over(q);
-        if all.len() > MOST_ASKED {
-            return None;
-        }
+        let all = self.asked(piece, q)?;
         let mut low: Vec<(f64, u32)> = all.iter().filter_map(over).collect();
         let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if low.len() > MOST_LOW {
@@ -378,7 +386,7 @@ impl Patches<'_> {
         }
         // And so may others on the way to where the line comes out.
         for _ in 0..if all { MOST_ON_THE_WAY } else { 0 } {
-            let Some(by) = self.cut_away_below(&piece.foot, here.distance) else { break };
+            let Some(by) = self.cut_away_below(piece, here.distance) else { break };
             hidden.to_mut().push(by);
             here = surface.along_normal_below(stock, point, normal, &hidden)?;
         }
@@ -390,7 +398,7 @@ impl Patches<'_> {
         let stock = (self.stock_top - point.z) * normal.z;
         let is_unpassed = here.distance < stock && free.is_none_or(|possible| possible >= stock);
         if (is_unpassed || is_wall(free))
-            && let Some(nearest) = self.nearest_of_lowest(&(point + normal * known))
+            && let Some(nearest) = self.nearest_of_lowest(piece, &(point + normal * known))
         {
             hidden.to_mut().push(nearest);
             free = self.by_moves(piece, known, here.by, &hidden, all);
@@ -479,17 +487,13 @@ impl Patches<'_> {
         found
     }
 
-    /// Of all moves that are lowest over a point the one whose axis is nearest in the plan; `None` where
+    /// Of all moves that are lowest over a point by a piece the one whose axis is nearest in the plan; `None` where
     /// there are too many to ask. Of many short moves on one level, the first that came over the centre of a
     /// cell may end beside it.
-    fn nearest_of_lowest(&self, point: &Point3) -> Option<u32> {
+    fn nearest_of_lowest(&self, piece: &Clipped, point: &Point3) -> Option<u32> {
         let envelope = &self.inspection.surface.envelope;
-        let all = self.inspection.every_move?.over(point.xy());
-        if all.len() > MOST_ASKED {
-            return None;
-        }
         let mut best: Option<(f64, f64, u32)> = None;
-        for &by in all {
+        for &by in self.asked(piece, point.xy())? {
             let Some(z) = envelope.height(by, point.x, point.y).filter(|z| *z < self.stock_top) else {
                 continue;
             };

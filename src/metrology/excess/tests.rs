@@ -406,6 +406,39 @@ fn sagitta(half: f64) -> f64 {
     3.0 - (9.0 - half * half).sqrt()
 }
 
+/// Thousands of short moves cut the same floor up to rims that cross each other everywhere, and one pass
+/// along its border cuts the slivers that they left. Cells show none of what covers a sliver, and there are
+/// too many moves to ask in every square: the smallest ones ask all, and nothing stands.
+#[test]
+fn slivers_between_thousands_of_moves_are_decided() {
+    let (cutter, radius) = (Cutter::flat(4.0).unwrap(), 2.0);
+    // Their rims end anywhere in a strip below that of the pass along the border.
+    let place = |k: usize| {
+        let (slow, fast) = (0.03 * k as f64, 0.0485 * k as f64);
+        Point3::new(2.0 + 2.5 * slow.sin(), SIDE - radius - 0.01 - 0.6 * (1.0 - fast.cos()), 0.0)
+    };
+    let mut tips: Vec<Point3> = (0..6000).map(place).collect();
+    for row in 0..3 {
+        tips.extend([-0.5, SIDE + 0.5].map(|x| Point3::new(x, 0.5 + 0.5 * f64::from(row), 0.0)));
+    }
+    for whole in [true, false] {
+        let end = if whole { SIDE + 0.5 } else { 0.5 * SIDE };
+        tips.extend([-0.5, end].map(|x| Point3::new(x, SIDE - radius + 0.001, 0.0)));
+        let to = |tip: &Point3| Move {
+            to: ClPoint::upright(*tip),
+            kind: MoveKind::Cut,
+            feed_rate: 1000.0,
+            pass: 0,
+        };
+        let moves: Vec<Move> = tips.iter().map(to).collect();
+        let path = Toolpath::new(moves[0].to, moves);
+        let found = measured(&part(0), &cutter, &path, 0.1).excess.highest;
+        assert_eq!(found.max_mm > 0.5 * TOP, !whole, "{found:?}");
+        assert!(found.error_bound_mm < 1e-3 || !whole, "{found:?}");
+        tips.truncate(tips.len() - 2);
+    }
+}
+
 /// A floor, a wall, and a level above it: a pass on the floor leaves the more the nearer a place is to the
 /// wall, most of all in the strip of a cell whose centre lies beyond the wall.
 #[test]

@@ -62,7 +62,19 @@ pub enum OutlineSource {
     Points {
         /// The curves.
         curves: Vec<Vec<Point2>>,
+        /// Place of the outline in the scene.
+        span: Place,
     },
+}
+
+/// Where something stands in a scene: no part of what it is, so that all places are equal.
+#[derive(Debug, Clone)]
+pub struct Place(pub std::ops::Range<usize>);
+
+impl PartialEq for Place {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// A plane region with islands, cut down to a level floor.
@@ -136,7 +148,7 @@ impl Source for PocketSource {
                     writeln!(out, "layer = {}", toml_string(layer))?;
                 }
             }
-            OutlineSource::Points { curves } => {
+            OutlineSource::Points { curves, .. } => {
                 writeln!(out, "outline = {}  # mm", toml_points(&curves[0]))?;
                 let islands: Vec<String> = curves[1..].iter().map(|curve| toml_points(curve)).collect();
                 writeln!(out, "islands = [{}]", islands.join(", "))?;
@@ -210,7 +222,7 @@ fn read_points(part: &Section<'_>) -> Result<OutlineSource, SceneError> {
         curves.push(without_repeats(island.value));
     }
     check(part, &curves, &spans)?;
-    Ok(OutlineSource::Points { curves })
+    Ok(OutlineSource::Points { curves, span: Place(spans.swap_remove(0)) })
 }
 
 fn read_drawing(table: &PartTable<'_>) -> Result<OutlineSource, SceneError> {
@@ -242,8 +254,15 @@ fn without_repeats(mut points: Vec<Point2>) -> Vec<Point2> {
     points
 }
 
-/// What mends a curve that crosses itself: often two of its points are meant as one.
+/// What mends a curve that crosses itself: often two of its points are meant as one, or it comes to one
+/// corner twice.
 fn cure_of_crossing(curve: &[Point2], at: &Point2) -> Option<String> {
+    if curve.iter().filter(|p| (*p - at).norm() <= outline::ROUNDING).count() > 1 {
+        return Some(format!(
+            "it comes to [{}, {}] twice: what touches at a corner are pockets of their own, or islands of one curve",
+            at.x, at.y
+        ));
+    }
     let next = |k: usize| (k + 1) % curve.len();
     let apart = |k: usize| (curve[k] - curve[next(k)]).norm();
     let near = |k: &usize| apart(*k) <= outline::JOIN_TOLERANCE;
@@ -280,8 +299,15 @@ fn check(
             Err(part.error(&spans[k], message, "islands lie inside of the outline and apart from each other"))
         }
         Err(e) => {
-            let cure = match e {
-                RegionError::SelfCrossing { curve, at } => cure_of_crossing(&curves[curve], &at),
+            let cure = match &e {
+                RegionError::SelfCrossing { curve, at } => cure_of_crossing(&curves[*curve], at),
+                RegionError::Crossing { curves: [0, _], .. } => Some(
+                    "an island at the outline is a part of it: leave the island out, and lead the outline around it".into(),
+                ),
+                RegionError::Crossing { .. } => {
+                    Some("write both islands as one: the curve around what they cover together".into())
+                }
+                RegionError::Duplicate { .. } => Some("delete one of them".into()),
                 _ => None,
             };
             let in_order =
@@ -329,7 +355,7 @@ impl PocketSource {
                 let notes = read.notes.iter().map(|note| format!("{}: {note}", file.written)).collect();
                 (read.region, notes, read.off_curves)
             }
-            OutlineSource::Points { curves } => {
+            OutlineSource::Points { curves, .. } => {
                 let region = Region::nested(curves.clone()).map_err(|e| self.refused(job, &e.to_string()))?.0;
                 (region, Vec::new(), 0.0)
             }
@@ -401,9 +427,12 @@ impl PocketSource {
         Ok(Part::from_mesh(mesh))
     }
 
-    /// Where the scene names its drawing, if it has one.
+    /// Where the scene names its drawing, or has its outline.
     fn span(&self) -> std::ops::Range<usize> {
-        self.file().map_or(0..0, |file| file.span.clone())
+        match &self.outline {
+            OutlineSource::File { file, .. } => file.span.clone(),
+            OutlineSource::Points { span: Place(span), .. } => span.clone(),
+        }
     }
 
     fn refused(&self, job: &Loading<'_>, what: &str) -> SceneError {
@@ -577,6 +606,49 @@ mod tests {
             assert!(refused.to_string().contains("crosses itself at x"), "{refused}");
             assert!(cure.contains(named) && cure.contains("delete one"), "{cure}");
         }
+    }
+
+    /// What touches is named with what to do about it: no order of corners mends it.
+    #[test]
+    fn curves_that_touch_are_told_how_to_be_drawn() {
+        let outline = "outline = [[0, 0], [40, 0], [40, 30], [0, 30]]\nislands = ";
+        for (curves, words) in [
+            (format!("{outline}[[[0, 10], [10, 10], [10, 16], [0, 16]]]"), "lead the outline around it"),
+            (format!("{outline}[[[0, 15], [8, 10], [16, 15], [8, 20]]]"), "lead the outline around it"),
+            (format!("{outline}[[[30, 10], [50, 10], [50, 20], [30, 20]]]"), "lead the outline around it"),
+            (
+                format!(
+                    "{outline}[[[10, 10], [20, 10], [20, 20], [10, 20]], [[20, 10], [30, 10], [30, 20]]]"
+                ),
+                "both islands as one",
+            ),
+            (
+                format!(
+                    "{outline}[[[10, 10], [22, 10], [22, 20], [10, 20]], [[20, 12], [30, 12], [30, 22]]]"
+                ),
+                "both islands as one",
+            ),
+            (
+                "outline = [[0, 0], [20, 10], [40, 0], [40, 30], [20, 10], [0, 30]]".into(),
+                "comes to [20, 10] twice",
+            ),
+            ("outline = [[0, 0], [40, 30], [40, 0], [0, 30]]".into(), "in order, each once"),
+        ] {
+            let scene = format!(
+                "[part]\nsurface = \"pocket\"\n{curves}\ndepth = 4\n[cutter]\nshape = \"flat\"\ndiameter = 5\n\
+                 [[toolpath]]\nstrategy = \"pocket-offset\"\n"
+            );
+            let refused = Scene::parse("pocket.toml", scene).unwrap_err();
+            let cure = miette::Diagnostic::help(&refused).unwrap().to_string();
+            assert!(cure.contains(words), "{curves}: {cure}");
+        }
+        // A cutter that does not fit is told at the outline.
+        let text = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [30, 0], [30, 5], [0, 5]]\ndepth = 4\n[cutter]\n\
+                    shape = \"flat\"\ndiameter = 6\n[[toolpath]]\nstrategy = \"pocket-offset\"\n";
+        let scene = Scene::parse("pocket.toml", text.to_owned()).unwrap();
+        let refused = crate::load_part(&scene).err().unwrap();
+        let label = miette::Diagnostic::labels(&refused).unwrap().next().unwrap();
+        assert_eq!(label.offset(), text.find("[[0, 0]").unwrap(), "{refused}");
     }
 
     #[test]

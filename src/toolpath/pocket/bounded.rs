@@ -69,6 +69,11 @@ pub(super) struct Rules {
     pub helix: [f64; 2],
     /// Length of a way down, mm.
     pub down: f64,
+    /// A helix leaves a core where the bottom is round: rings this far apart, mm, take it off, up to the least
+    /// one of [`Self::core`].
+    pub step: f64,
+    /// A ring no larger than this leaves no core, mm.
+    pub core: f64,
 }
 
 /// Keeps runs to their room, and puts loops into them.

@@ -172,14 +172,31 @@ impl Clearer<'_> {
         if let Some(ground) = ground {
             *self.ground = ground;
         }
-        let points = points.split_off(way.len() - 1);
+        let mut points = points.split_off(way.len() - 1);
         self.cells.clear_along(&points);
+        if let Entry::Helix { centre, radius, .. } = entry {
+            let rings = rings_within(&centre, radius, self.rules);
+            points.splice(0..0, rings);
+        }
         Ok(Run { entry, points })
     }
 
     fn deep_in_stock(&self) -> Result<Option<Point2>, Cancelled> {
         self.cells.deep_in_stock(self.room, self.ground, self.rules.helix[1], self.monitor)
     }
+}
+
+/// From the beginning of a helix over the core that a round bottom leaves within it, and back.
+fn rings_within(centre: &Point2, radius: f64, rules: &Rules) -> Vec<Point2> {
+    let begin = centre + geometry::Vector2::new(radius, 0.0);
+    let mut ring = radius;
+    let mut way = Vec::new();
+    while ring > rules.core {
+        ring = (ring - rules.step).max(0.0);
+        let first = circle(centre, ring, 0.0, STEP * rules.bounds.radius);
+        way.extend(first.iter().chain(first.first()).copied());
+    }
+    if way.is_empty() { way } else { std::iter::once(begin).chain(way).collect() }
 }
 
 /// Once around each wall.
@@ -205,7 +222,14 @@ mod tests {
 
     fn rules(limit: f64, radius: f64) -> Rules {
         let bounds = Turning { limit, radius };
-        Rules { bounds, sides: Sides::Left, helix: [0.8 * radius, 0.2 * radius], down: 40.0 }
+        Rules {
+            bounds,
+            sides: Sides::Left,
+            helix: [0.8 * radius, 0.2 * radius],
+            down: 40.0,
+            step: radius,
+            core: radius,
+        }
     }
 
     /// Two circles joined by a corridor: from a helix each they are cleared by a much shorter path than

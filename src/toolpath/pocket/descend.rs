@@ -5,7 +5,7 @@ use super::route::{Entry, Run};
 use super::strategy::{PocketStrategy, WallFinish};
 use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
-use motion::{ClPoint, Move, MoveKind, Toolpath, in_last_decimals};
+use motion::{ClPoint, DECIMALS, Move, MoveKind, Toolpath, in_last_decimals};
 
 /// Share of the chord tolerance that the chords of a helix may use, when the rest is left to what is done
 /// with the moves afterwards. Greater shares make fewer moves.
@@ -14,8 +14,14 @@ const ARC_SHARE: f64 = 0.5;
 /// A way down begins this far above the stock that is left, mm: rapids end there.
 const ABOVE: f64 = 0.5;
 
-/// A ramp shorter than this, mm, goes on along its run, and is a plunge where that is no longer.
+/// A ramp shorter than this over the cutter's radius, and than this, mm, goes on along its run, and is a
+/// plunge where that is no longer.
+const RAMP_OVER_RADIUS: f64 = 1.0 / 6.0;
 const LEAST_RAMP: f64 = 0.5;
+
+/// Sides of ways down are no shorter in the plan than so many last decimals of the program: the slope of
+/// shorter ones is that of their rounding.
+const LEAST_SIDE: f64 = 10.0;
 
 /// Depths and ways below which a difference is rounding, mm.
 const ROUNDING: f64 = 1.0e-9;
@@ -87,6 +93,8 @@ struct Writer<'a> {
     at: Option<Point3>,
     start: Option<Point3>,
     pass: u32,
+    /// Radius of the cutter, mm.
+    radius: f64,
 }
 
 impl Writer<'_> {
@@ -104,7 +112,7 @@ impl Writer<'_> {
     fn runs(&mut self, runs: &[Run], [above, floor]: [f64; 2], strategy: &PocketStrategy) {
         let (settings, safe) = (self.settings, self.safe);
         for run in runs.iter().filter(|run| !run.points.is_empty()) {
-            let way = way_down(run, above, floor, strategy, settings.chord_tolerance);
+            let way = way_down(run, [above, floor], strategy, self.radius, settings.chord_tolerance);
             let first = way[0];
             let (over, near) = (Point3::new(first.x, first.y, safe), (first.z + ABOVE).min(safe));
             self.to(over, MoveKind::Rapid, 0.0);
@@ -138,15 +146,16 @@ pub(super) struct Runs {
     pub along_walls: Vec<Run>,
 }
 
-/// Every run at every floor; where walls have one pass of all the depth, that comes last.
+/// Every run of a cutter of a radius at every floor; where walls have one pass of all the depth, that comes
+/// last.
 pub(super) fn program(
     runs: &Runs,
-    depth: f64,
+    [depth, radius]: [f64; 2],
     strategy: &PocketStrategy,
     settings: &PlanSettings,
 ) -> Toolpath {
     let safe = settings.stock_top + settings.clearance;
-    let mut writer = Writer { settings, safe, moves: Vec::new(), at: None, start: None, pass: 0 };
+    let mut writer = Writer { settings, safe, moves: Vec::new(), at: None, start: None, pass: 0, radius };
     let mut above = settings.stock_top;
     for floor in floors([settings.stock_top, depth], strategy) {
         writer.runs(&runs.clearing, [above, floor], strategy);
@@ -178,17 +187,35 @@ fn back_and_forth(way: &[Point2], far: f64) -> Vec<Point2> {
     forth.iter().chain(forth.iter().rev().skip(1)).copied().collect()
 }
 
-/// Tips from `above` down to where a run begins.
+/// The way without the points that are nearer than [`LEAST_SIDE`] to the one before them; its ends stay.
+fn without_short_sides(way: &[Point2]) -> Vec<Point2> {
+    let [first, .., last] = way else { return way.to_vec() };
+    let least = LEAST_SIDE / 10f64.powi(DECIMALS as i32);
+    let mut kept = vec![*first];
+    for p in &way[1..] {
+        if kept.last().is_none_or(|before| (p - before).norm() >= least) {
+            kept.push(*p);
+        }
+    }
+    while kept.len() > 1 && kept.last().is_some_and(|before| (last - before).norm() < least) {
+        kept.pop();
+    }
+    kept.push(*last);
+    kept
+}
+
+/// Tips of a cutter of a radius from `above` down to where a run begins.
 fn way_down(
     run: &Run,
-    above: f64,
-    floor: f64,
+    [above, floor]: [f64; 2],
     strategy: &PocketStrategy,
+    radius: f64,
     chord_tolerance: f64,
 ) -> Vec<Point3> {
     let drop = above - floor;
     let begin = run.points[0];
     let plunge = vec![Point3::new(begin.x, begin.y, above), Point3::new(begin.x, begin.y, floor)];
+    let least = LEAST_RAMP.min(RAMP_OVER_RADIUS * radius);
     let once: Vec<Point2> = match &run.entry {
         Entry::Helix { centre, radius, begin } => {
             let spacing = (8.0 * radius * ARC_SHARE * chord_tolerance).sqrt();
@@ -196,14 +223,15 @@ fn way_down(
             turn.push(turn[0]);
             turn
         }
-        Entry::Ramp(way) if length(way) < LEAST_RAMP => {
+        Entry::Ramp(way) if length(way) < least => {
             back_and_forth(&run.points, 0.5 * drop / strategy.ramp_angle.tan())
         }
         Entry::Ramp(way) => way.clone(),
         Entry::Air => return plunge,
     };
+    let once = without_short_sides(&once);
     let length = length(&once);
-    if length < LEAST_RAMP || drop <= ROUNDING {
+    if length < least || drop <= ROUNDING {
         return plunge;
     }
     let times = (drop / (length * strategy.ramp_angle.tan()) - ROUNDING).ceil().max(1.0);
@@ -249,17 +277,19 @@ mod tests {
             gentle: Vec::new(),
         };
         let run = Run { entry: Entry::Ramp(short.clone()), points: points.clone() };
-        let tips = way_down(&run, 0.0, -2.0, &strategy, 1e-3);
+        let tips = way_down(&run, [0.0, -2.0], &strategy, 3.0, 1e-3);
         assert_eq!((tips[0], tips[tips.len() - 1]), (Point3::origin(), Point3::new(0.0, 0.0, -2.0)));
         for w in tips.windows(2) {
             let slope = (w[0].z - w[1].z).atan2((w[1] - w[0]).xy().norm());
             assert!(slope <= 3f64.to_radians() + 1e-9, "{} {}", w[0], w[1]);
         }
         // No farther than one way of the slope needs, and straight down where the run is as short.
-        let shallow = way_down(&run, 0.0, -0.1, &strategy, 1e-3);
+        let shallow = way_down(&run, [0.0, -0.1], &strategy, 3.0, 1e-3);
         assert!(shallow.iter().all(|tip| tip.x <= 0.06), "{shallow:?}");
         let run = Run { entry: Entry::Ramp(short), points: points[..2].to_vec() };
-        assert_eq!(way_down(&run, 0.0, -2.0, &strategy, 1e-3).len(), 2);
+        assert_eq!(way_down(&run, [0.0, -2.0], &strategy, 3.0, 1e-3).len(), 2);
+        // For a tiny cutter it is long enough.
+        assert!(way_down(&run, [0.0, -0.1], &strategy, 0.05, 1e-3).len() > 10);
     }
 
     /// Ways down with sides from micrometres to millimetres, steep and flat, around a helix as well: as the
@@ -300,7 +330,7 @@ mod tests {
         for ramp_angle in [0.4, 3.0, 20.0, 45.0] {
             for (entry, points) in [(Entry::Ramp(back.clone()), way.clone()), (helix.clone(), vec![begin])] {
                 let runs = Runs { clearing: vec![Run { entry, points }], along_walls: Vec::new() };
-                let path = program(&runs, 2.6, &strategy(ramp_angle), &settings).as_written();
+                let path = program(&runs, [2.6, 3.0], &strategy(ramp_angle), &settings).as_written();
                 let mut fastest = 0.0f64;
                 for (a, b, m) in path.segments().filter(|(a, b, m)| m.kind == MoveKind::Plunge && a != b) {
                     let down = m.feed_rate * (a.z - b.z) / (b - a).norm();

@@ -134,14 +134,15 @@ pub fn plan_pocket(
         planned.notes.extend(feed_check(&vectors.direction, &Aabb { min: low, max: high }, &[domain])?);
     }
     let air = Air::of(pocket, radius);
+    let step = strategy.stepover(settings.step, radius);
     let mut ground = Cleared::new(around, radius);
     ground.gentle.clone_from(&strategy.gentle);
     air.iter().flat_map(|air| &air.discs).for_each(|p| ground.add(*p));
     let mut planner = Planner {
         cutter,
         strategy,
-        step: strategy.stepover(settings.step, radius),
-        rules: strategy.rules(radius, pocket.depth),
+        step,
+        rules: strategy.rules(step, cutter, pocket.depth),
         air,
         ground,
         bounding: bounded::Bounding::default(),
@@ -162,7 +163,7 @@ pub fn plan_pocket(
     }
     let rest = pocket.rest_area(cutter, monitor)?;
     planner.planned.notes.push(format!(
-        "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
+        "{rest:.3} mm² of {:.1} mm² are out of the cutter's reach: corners, or places narrower than it",
         pocket.region.area()
     ));
     clearing.extend(planner.kept(groups)?);
@@ -177,7 +178,7 @@ pub fn plan_pocket(
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
-    let path = descend::program(&runs, pocket.depth, strategy, settings);
+    let path = descend::program(&runs, [pocket.depth, radius], strategy, settings);
     let Planner { mut planned, bounding, rules, .. } = planner;
     if rules.is_some() {
         tell_bounding(&bounding, &mut planned.notes);
@@ -272,7 +273,9 @@ impl Planner<'_> {
 
 /// Notes what kept the engagement to the limit, and where nothing did.
 fn tell_bounding(bounded::Bounding { loops, above }: &bounded::Bounding, notes: &mut Vec<String>) {
-    notes.push(format!("{loops} loops in each step down bound the engagement"));
+    if *loops > 0 {
+        notes.push(format!("{loops} loops in each step down bound the engagement"));
+    }
     if let Some((place, longest)) = above.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         let all: f64 = above.iter().map(|stretch| stretch.1).sum();
         notes.push(format!(

@@ -294,6 +294,14 @@ impl Pocket {
         self.within(if by < 0.0 { centres.inset(-by) } else { centres.grown(by) })
     }
 
+    /// Where stock stands above the floor that a cutter cannot reach: all of the region but its
+    /// [reachable floor](Self::reachable_floor), and what is nearer than `strip` mm to its walls, which is no
+    /// less than `clear`. The flat of a bottom reaches corners, necks and the foot of walls no farther.
+    pub fn out_of_reach(&self, cutter: &Cutter, [clear, strip]: [f64; 2]) -> Region {
+        let reached = self.reachable_floor(cutter, clear).union(&self.air);
+        self.free.inset(strip).intersection(&self.region).without(&reached)
+    }
+
     /// Area of the region that no position of the cutter sweeps, mm²: what stays in sharp corners. Over a
     /// square corner it is `r² (1 − π/4)`.
     ///
@@ -540,6 +548,34 @@ mod tests {
         // From one place of the outline to another one, across the pocket.
         let across = square().opened(&[points(&[(20., 0.), (20., 5.), (0., 20.)])], 1e-3, 2.0).unwrap_err();
         assert_eq!((across.line, across.at), (0, Point2::new(10.0, 12.5)));
+    }
+
+    /// A neck that is narrower than the cutter and corners are out of its reach; in a round hole, drawn with
+    /// chords, nothing is, nor in what a larger cutter cleared before.
+    #[test]
+    fn necks_and_corners_are_out_of_reach() {
+        let cutter = Cutter::flat(6.0).unwrap();
+        let strip = [0.01, 0.02];
+        let sides =
+            [(0., 0.), (20., 0.), (20., 10.), (40., 10.), (40., 0.), (60., 0.), (60., 20.), (40., 20.)];
+        let dumbbell = points(&[&sides[..], &[(40., 14.), (20., 14.), (20., 20.), (0., 20.)]].concat());
+        let pocket = Pocket::new(Region::nested(vec![dumbbell]).unwrap().0, 5.0);
+        let out = pocket.out_of_reach(&cutter, strip);
+        assert!(out.contains(&Point2::new(30.0, 12.0)) && !out.contains(&Point2::new(10.0, 10.0)));
+        let corner = 9.0 * (1.0 - std::f64::consts::FRAC_PI_4);
+        // Where the neck begins, the cutter leans in by the height of its arc.
+        let lens = 9.0 * (2.0 / 3.0_f64).asin() - 2.0 * 5f64.sqrt();
+        let area = 80.0 + 8.0 * corner - 2.0 * lens;
+        assert!((out.area() - area).abs() < 0.02 * area, "{} {area}", out.area());
+        let round: Vec<Point2> = (0..180)
+            .map(|k| std::f64::consts::TAU * f64::from(k) / 180.0)
+            .map(|a| Point2::new(9.0 * a.cos(), 9.0 * a.sin()))
+            .collect();
+        let round = Pocket::new(Region::nested(vec![round]).unwrap().0, 5.0);
+        assert!(round.out_of_reach(&cutter, strip).is_empty());
+        let left = square().cleared_by(4.0, 0.0).out_of_reach(&Cutter::bull(6.0, 1.0).unwrap(), strip);
+        let [bull, flat] = [6.0, 8.0].map(|d: f64| d * d * (1.0 - std::f64::consts::FRAC_PI_4));
+        assert!(left.area() < bull.max(flat) && !left.contains(&Point2::new(10.0, 0.5)), "{}", left.area());
     }
 
     /// Two open sides with the corner between them, turned to any angle, with and without a place of a line

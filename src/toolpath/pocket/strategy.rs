@@ -59,6 +59,10 @@ impl Pattern {
 pub(super) const SPARE: f64 = 0.025;
 const SPARE_OF_LOOPS: f64 = 0.04;
 
+/// Passes are planned for no less than this, rad, which is some hundredth of the radius aside: less is lost in
+/// what angles have to spare.
+const LEAST_OF_STEP: f64 = 0.15;
+
 /// How deep the last passes along the walls go at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WallFinish {
@@ -212,7 +216,8 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
 }
 
 /// The stepover of a pocket's toolpath. By default the ridges that the round of the corner leaves between
-/// passes stay below `scallop` mm.
+/// passes stay below `scallop` mm, and passes along the border of the stock are as far apart as their
+/// engagement allows.
 ///
 /// # Errors
 /// A stepover that leaves material between passes.
@@ -231,7 +236,11 @@ pub fn read_pocket_step(section: &Section<'_>, cutter: &Cutter, scallop: f64) ->
         Some(step) => step.value,
         // Rounded, so that it reads back as it was written.
         None => {
-            let usual = (2.0 * STEPOVER_OVER_DIAMETER * radius).min(STEPOVER_OVER_LOW * low);
+            let strategy = section.text("strategy")?.map(|word| word.value);
+            let peels = section.has("engagement") && [Some(FLOW.word), Some(OFFSET.word)].contains(&strategy);
+            let share = if peels && corner == 0.0 { MOST_STEPOVER } else { STEPOVER_OVER_DIAMETER };
+            let widest = if corner > 0.0 { STEPOVER_OVER_LOW * low } else { f64::INFINITY };
+            let usual = (2.0 * share * radius).min(widest);
             (usual.max(LEAST_STEPOVER * radius) * 1e6).round() / 1e6
         }
     };
@@ -306,7 +315,8 @@ impl Strategy for PocketStrategy {
 }
 
 impl PocketStrategy {
-    /// The stepover, mm: the one asked for, or less where the engagement asks for it.
+    /// The stepover, mm: the one asked for, or less where the engagement asks for it. Passes of bounded
+    /// engagement have it where they are straight, and more where they turn toward stock, around islands.
     pub fn stepover(&self, step: Step, radius: f64) -> f64 {
         let asked = match step {
             Step::Stepover(s) => s,
@@ -321,15 +331,21 @@ impl PocketStrategy {
         self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - spare)
     }
 
-    /// What passes are bounded by, if they are.
-    pub(super) fn rules(&self, radius: f64, depth: f64) -> Option<Rules> {
-        let bounds = Turning { limit: self.bounded()?, radius };
+    /// What passes `step` mm apart at most are bounded by, if they are.
+    pub(super) fn rules(&self, step: f64, cutter: &Cutter, depth: f64) -> Option<Rules> {
+        let radius = cutter.radius();
+        let bounded = self.bounded()?;
+        // Passes along the border of the stock lie as far apart as the angle says; loops follow lines that do.
+        let of_step = engagement_angle(step, radius).max(LEAST_OF_STEP);
+        let limit = if self.pattern.peels() { bounded.min(of_step) } else { bounded };
+        let bounds = Turning { limit, radius };
         let sides = match self.pattern {
             Pattern::Zigzag { angle } => Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
             Pattern::Flow(_) | Pattern::Offset { .. } | Pattern::Streamline(_) => Sides::Left,
         };
         let down = self.stepdown.map_or(depth, |step| step.min(depth)) / self.ramp_angle.sin();
-        Some(Rules { bounds, sides, helix: self.helix(radius), down })
+        let core = cutter.flat_radius().max(0.5 * step);
+        Some(Rules { bounds, sides, helix: self.helix(radius), down, step, core })
     }
 
     /// Radius that a helix should have, and the least that is worth one, mm.

@@ -20,7 +20,7 @@ use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
 use crate::vocabulary::{Contact, FeedDirection, Lines, Passes, PlanError};
 use cutter::Cutter;
-use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, singular_points};
+use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, Sense, singular_points};
 use geometry::{Piece, Point2, Point3, SegmentGrid, Vector2, Vector3};
 use work::monitor::{Cancelled, Monitor};
 
@@ -71,10 +71,19 @@ pub fn runs(
         (places.iter().map(|place| place.length), (0..mesh.triangles().len()).map(|t| mesh.area(t)));
     let followed = step * rise.sum::<f64>() / area.sum::<f64>();
     if vectors.along_walls && followed < LEAST_FOLLOWED {
-        return Err(not_applicable(
-            "the directions lead from wall to wall, and no function with one value along each wall follows them: leave out \
-             `along_walls`, or take directions that go around",
-        ));
+        if vectors.direction != FeedDirection::Border(Sense::Along) {
+            return Err(not_applicable(
+                "the directions lead from wall to wall, and no function with one value along each wall follows them: write \
+                 `along_walls = false`, or take directions that go around",
+            ));
+        }
+        planned.notes.push(
+            "both walls of a slot lead the same way, and no function with one value along each wall follows them: passes \
+             end at walls there, as with `along_walls = false`"
+                .into(),
+        );
+        let ending = Vectors { along_walls: false, ..vectors.clone() };
+        return runs(piece, &ending, cutter, step, planned, monitor);
     }
     let placed = place_levels(&places, range, vectors.lines.steps(), &mut planned.notes);
     let mut passes = along_and_between(&source, &placed, range, SAMPLING * step, monitor)?;

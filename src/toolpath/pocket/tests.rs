@@ -148,6 +148,40 @@ fn programs_keep_to_the_pocket_and_clear_it() {
 }
 
 /// From each curve of a flow the next one inwards is within the stepover, and somewhere just that far.
+/// Rings of many sizes, drawn with more chords or fewer: no way down has two places that writing puts
+/// together, none is steeper than asked but for its last decimals, and flat ones are fed as passes are.
+#[test]
+fn ways_down_of_rings_survive_writing() {
+    let cutter = Cutter::flat(8.0).unwrap();
+    let circle = |at: Point2, r: f64, n: usize| -> Vec<Point2> {
+        let angle = |k: usize| 2.0 * PI * k as f64 / n as f64;
+        // As scenes write them.
+        let written = |c: f64| (c * 1e6).round() / 1e6;
+        (0..n)
+            .map(|k| Point2::new(written(at.x + r * angle(k).cos()), written(at.y + r * angle(k).sin())))
+            .collect()
+    };
+    for k in 0..24 {
+        let chord = [0.005, 0.01, 0.02][k % 3];
+        let outer = circle(Point2::origin(), 22.0 + 0.375 * k as f64, 180);
+        let inner = circle(Point2::new(3.0, 2.0), 5.5 + 0.125 * k as f64, 72);
+        let pocket = Pocket::new(Region::nested(vec![outer, inner]).unwrap().0, 4.0);
+        let strategy = PocketStrategy { stepdown: None, ..strategy(Pattern::Offset { spiral: false }) };
+        let settings = PlanSettings { step: Step::Stepover(3.0), chord_tolerance: chord, ..settings() };
+        let path = plan_pocket(&pocket, &cutter, &strategy, &settings, &Silent).unwrap().path.as_written();
+        let under = |p: &Point3| p.z < 1e-9;
+        for (a, b, m) in path.segments().filter(|(a, b, m)| m.kind == MoveKind::Plunge && under(a) && a != b)
+        {
+            let (run, drop) = ((b - a).xy().norm(), a.z - b.z);
+            let decimals = 2.0 * motion::ROUNDING;
+            assert!(run > 5.0 * decimals || drop == 0.0, "{k}: {a} {b}");
+            let slope = (drop - 1.01 * decimals).atan2(run + 1.5 * decimals);
+            assert!(slope <= 3f64.to_radians(), "{k}: {a} {b}");
+            assert!(m.feed_rate >= 900.0, "{k}: {} from {a} to {b}", m.feed_rate);
+        }
+    }
+}
+
 #[test]
 fn neighbouring_passes_lie_within_the_stepover() {
     let region = with_island().region.inset(3.0);
@@ -364,6 +398,33 @@ fn directions_across_do_not_run_along_walls() {
 
 /// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and
 /// streamlines traced by Runge and Kutta's method stay on them within the chord tolerance.
+/// No function with one value along the wall follows both sides of a slot. Passes then end at walls, which a
+/// note tells, and clear it.
+#[test]
+fn streamlines_of_a_slot_end_at_its_walls() {
+    let cutter = Cutter::flat(6.0).unwrap();
+    let side = |x: f64, from: f64| {
+        let at = move |k: i32| from + PI * f64::from(k) / 48.0;
+        (0..=48).map(move |k| Point2::new(x + 4.0 * at(k).cos(), 4.0 * at(k).sin()))
+    };
+    let slot = pocket(vec![side(40.0, -0.5 * PI).chain(side(0.0, 0.5 * PI)).collect()]);
+    let along = FeedDirection::Border(Sense::Along);
+    let vectors =
+        Vectors { direction: along, direction_weight: 1.0, along_walls: true, lines: Lines::Levels };
+    let strategy = strategy(Pattern::Streamline(vectors));
+    let plan = plan_pocket(&slot, &cutter, &strategy, &settings(), &Silent).unwrap();
+    assert!(plan.notes.iter().any(|note| note.contains("along_walls = false")), "{:?}", plan.notes);
+    let cuts = plan.path.segments().filter(|(.., m)| m.kind == MoveKind::Cut);
+    let passes: Vec<[Point2; 2]> = cuts.map(|(a, b, _)| [a.xy(), b.xy()]).collect();
+    for k in 0..400 {
+        let q = Point2::new(-3.9 + 0.12 * f64::from(k), 3.9 * (0.7 * f64::from(k)).sin());
+        if slot.reachable_floor(&cutter, 0.02).contains(&q) {
+            let near = passes.iter().any(|[a, b]| geometry::distance_to_segment(&q, a, b) <= 3.0 + 1e-3);
+            assert!(near, "{q}");
+        }
+    }
+}
+
 #[test]
 fn streamlines_around_an_island_are_the_traced_ones() {
     let pocket = pocket(vec![disc(0.0, 0.0, 30.0), disc(0.0, 0.0, 6.0)]);

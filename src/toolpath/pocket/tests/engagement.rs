@@ -1,7 +1,7 @@
 //! The engagement of planned passes, as metrology measures it.
 
 use cutter::Cutter;
-use geometry::{Aabb, Point2, Point3, Region, RegionIndex, SegmentGrid};
+use geometry::{Aabb, Point2, Point3, Region, RegionIndex, SegmentGrid, Vector2};
 use machine::Machine;
 use metrology::{ContactArcs, UNCOUNTED_LAYER, contact_arcs};
 use motion::{Move, MoveKind, Toolpath};
@@ -9,6 +9,7 @@ use sim::Stock;
 use work::monitor::Silent;
 
 use super::super::walls;
+use super::{PI, disc, pocket, rectangle, settings, strategy};
 use crate::vocabulary::{Joining, PlanSettings, Step};
 use crate::{Flow, Pattern, Plan, Pocket, PocketStrategy, WallFinish, plan_pocket};
 
@@ -324,6 +325,43 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                 let longest = if matches!(pattern, Pattern::Zigzag { .. }) { TIP } else { 0.15 };
                 assert!(above.iter().all(|(_, length)| *length <= longest * radius), "{what}: {above:?}");
             }
+        }
+    }
+}
+
+/// Where an engagement is asked for beside a stepover, no place that the cutter's centre may come to is farther
+/// from a pass than half of the stepover, with what turns add; the core of a helix is taken off as well.
+#[test]
+fn bounded_passes_keep_to_the_stepover() {
+    let cutter = Cutter::ball(8.0).unwrap();
+    for (outline, step) in [(rectangle(0.0, 0.0, 30.0, 24.0), 0.4), (disc(0.0, 0.0, 14.0), 1.1)] {
+        let pocket = pocket(vec![outline]);
+        let engagement = Some(PI / 2.0);
+        for pattern in
+            [Pattern::Offset { spiral: false }, Pattern::Flow(Flow { smoothing: None, spiral: false })]
+        {
+            let strategy = PocketStrategy { engagement, stepdown: None, ..strategy(pattern) };
+            let settings = PlanSettings { step: Step::Stepover(step), ..settings() };
+            let path = plan_pocket(&pocket, &cutter, &strategy, &settings, &Silent).unwrap().path;
+            let floor = -pocket.depth + 1e-6;
+            let cuts = path.segments().filter(|(a, b, _)| a.z < floor && b.z < floor);
+            let sides: Vec<_> = cuts
+                .map(|(a, b, _)| geometry::CurveSegment { ends: [a.xy(), b.xy()], curve: 0, index: 0 })
+                .collect();
+            let passes = SegmentGrid::new(sides);
+            let room = pocket.region.inset(4.0);
+            let [low, high] = room.bounds().unwrap();
+            let (mut farthest, mut at) = (0.0, low);
+            for k in 0..40_000 {
+                let share = |by: f64| (f64::from(k) * by).fract();
+                let size = high - low;
+                let q = low + Vector2::new(size.x * share(0.618_033_988_7), size.y * share(0.754_877_666));
+                let off = passes.distance(&q);
+                if room.contains(&q) && off > farthest {
+                    (farthest, at) = (off, q);
+                }
+            }
+            assert!(farthest <= 0.66 * step, "{step}: {farthest} at {at}");
         }
     }
 }
