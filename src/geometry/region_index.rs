@@ -8,6 +8,8 @@ pub struct RegionIndex {
     region: Region,
     sides: SegmentGrid,
     right: f64,
+    /// Of buckets without sides, whether they lie inside: all of one does, or nothing.
+    inside: Vec<Option<bool>>,
 }
 
 impl RegionIndex {
@@ -15,7 +17,9 @@ impl RegionIndex {
     pub fn new(region: Region) -> Self {
         let sides = SegmentGrid::of_curves(region.curves());
         let right = region.bounds().map_or(0.0, |[_, hi]| hi.x);
-        Self { region, sides, right }
+        let mut index = Self { region, sides, right, inside: Vec::new() };
+        index.inside = index.sides.empty_buckets().map(|at| at.map(|at| index.crosses_odd(&at))).collect();
+        index
     }
 
     /// The region.
@@ -30,6 +34,11 @@ impl RegionIndex {
 
     /// As [`Region::contains`].
     pub fn contains(&self, p: &Point2) -> bool {
+        self.inside[self.sides.bucket_at(p)].unwrap_or_else(|| self.crosses_odd(p))
+    }
+
+    /// Whether a level ray from a place to the right crosses an odd number of sides.
+    fn crosses_odd(&self, p: &Point2) -> bool {
         let mut crossed: Vec<u32> = Vec::new();
         if p.x <= self.right {
             self.sides.near(&[*p, Point2::new(self.right, p.y)], |k| {
@@ -116,6 +125,22 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Places in buckets without sides, beside them and beyond all, against all sides of a ring of many.
+    #[test]
+    fn buckets_without_sides_lie_inside_or_outside() {
+        let circle = |r: f64| {
+            let turn = |k: u32| f64::from(k) / 400.0 * std::f64::consts::TAU;
+            (0..400).map(|k| Point2::new(r * turn(k).cos(), r * turn(k).sin())).collect::<Vec<_>>()
+        };
+        let index = RegionIndex::new(region(vec![circle(10.0), circle(4.0)]));
+        assert!(index.inside.contains(&Some(true)) && index.inside.contains(&Some(false)));
+        for k in 0..250 * 250 {
+            let p = Point2::new(0.1 * f64::from(k % 250) - 12.47, 0.1 * f64::from(k / 250) - 12.43);
+            assert_eq!(index.contains(&p), index.region().contains(&p), "{p}");
+        }
+        assert!(!RegionIndex::new(Region::default()).contains(&Point2::origin()));
     }
 
     /// Areas of two rectangles that overlap, and of two that share a side.

@@ -124,6 +124,21 @@ impl SegmentGrid {
         &self.items[self.first[k] as usize..self.first[k + 1] as usize]
     }
 
+    /// The middles of the buckets, in the order of their indices: `None` where segments meet one.
+    pub(crate) fn empty_buckets(&self) -> impl Iterator<Item = Option<Point2>> + '_ {
+        (0..self.nx * self.ny).map(|k| {
+            let at = |k: usize| (k as f64 + 0.5) * self.cell;
+            let middle = self.origin + super::Vector2::new(at(k % self.nx), at(k / self.nx));
+            (self.first[k] == self.first[k + 1]).then_some(middle)
+        })
+    }
+
+    /// The bucket of a place, by its index: the nearest one where it lies outside all.
+    pub(crate) fn bucket_at(&self, p: &Point2) -> usize {
+        let [i, j] = self.bucket(p);
+        j * self.nx + i
+    }
+
     /// The nearest segment to `p`; `None` without segments.
     pub fn nearest(&self, p: &Point2) -> Option<NearestSegment> {
         let [ci, cj] = self.bucket(p);

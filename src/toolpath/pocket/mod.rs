@@ -7,7 +7,8 @@
 //! where there is room, else by a ramp along its first pass. Where an engagement is asked for, passes go
 //! along the border of the stock instead, which they turn into as far as the limit allows (`peel`,
 //! `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). What passes without a
-//! limit leave gets short ones of its own (`rest`). Every finished move keeps to the exact region (`walls`).
+//! limit leave gets short ones of its own (`rest`, `ridges`). Every finished move keeps to the exact region
+//! (`walls`).
 //! The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
@@ -26,6 +27,7 @@ mod loops;
 mod nest;
 mod peel;
 mod rest;
+mod ridges;
 mod route;
 mod shape;
 pub(crate) mod strategy;
@@ -59,11 +61,8 @@ use work::monitor::{self, Monitor};
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
 
-/// Flats that are narrower than this over the stepover leave ridges between all passes, and nothing but
-/// ridges nearer to a pass than this over the stepover: between offsets around a square corner are 0.59 of
-/// it.
+/// Flats that are narrower than this over the stepover leave ridges between all passes.
 const HALF_STEP: f64 = 0.51;
-const REST_OVER_STEP: f64 = 0.6;
 
 /// Longest move over the cutter's radius: feeds and engagement belong to moves.
 const MOVE_OVER_RADIUS: f64 = 0.5;
@@ -229,19 +228,24 @@ impl Planner<'_> {
     }
 
     fn runs_of(&mut self, piece: &Piece) -> Result<Vec<Run>, PlanError> {
-        let Self { cutter, strategy, step, monitor, .. } = *self;
+        let Self { cutter, strategy, step: interval, monitor, .. } = *self;
         let helix = self.air.is_none();
+        let flat = cutter.flat_radius();
+        // Passes under which the bottom is level for half an interval leave no ridges.
+        let ridges = self.rules.is_none() && flat < HALF_STEP * interval;
+        let step = if ridges { ridges::INTERVAL_SHARE * interval } else { interval };
         let mut runs = piece_runs(piece, cutter, strategy, step, helix, &mut self.planned, monitor)?;
         // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from
         // elsewhere.
         if self.rules.is_some() {
             return Ok(runs);
         }
-        // Passes far from each other may leave something at sharp turns of inner ones.
-        // What passes leave between them on purpose, where the flat of the bottom is narrow, is no rest.
-        let flat = cutter.flat_radius();
-        let reach = if flat > 0.0 && flat < HALF_STEP * step { REST_OVER_STEP * step } else { flat };
-        runs.extend(rest::runs_to_rest(piece, &runs, reach, monitor)?);
+        if ridges {
+            ridges::cut(piece, &mut runs, 0.5 * interval, monitor)?;
+        } else {
+            // Passes far from each other may leave something at sharp turns of inner ones.
+            runs.extend(rest::runs_to_rest(piece, &runs, flat, monitor)?);
+        }
         let Some(air) = &self.air else { return Ok(runs) };
         let room = walls::Room::new(piece);
         Ok(runs.into_iter().map(|run| air.entered(run, &room)).collect())
@@ -300,22 +304,24 @@ fn piece_runs(
     };
     let radius = cutter.radius();
     let flat = cutter.flat_radius();
-    let reach = if flat > 0.0 { REACH * flat } else { step };
     let turning = strategy.bounded().map(|limit| Turning { limit, radius });
-    let spacing = turning
-        .map_or(nest::Spacing::lenient(step, reach), |turning| nest::Spacing::bounded(step, reach, turning));
+    // Corners of curves that lie far apart leave ridges under a round bottom, and those get ways of their own.
+    let round = turning.is_none() && flat < HALF_STEP * step;
+    let reach = if flat > 0.0 && !round { REACH * flat } else { step };
+    let spacing = match turning {
+        Some(turning) => nest::Spacing::bounded(step, reach, turning),
+        None => nest::Spacing::lenient(step, reach),
+    };
     let (nest, spiral) = match &strategy.pattern {
         Pattern::Streamline(vectors) => return stream::runs(piece, vectors, cutter, step, planned, monitor),
         Pattern::Zigzag { angle } => {
             let step = turning.map_or(step, |turning| step.min(turning.step(0.0)));
             return Ok(lines::runs(piece, *angle, step));
         }
-        Pattern::Offset { spiral } => {
-            (nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?, *spiral)
-        }
+        Pattern::Offset { spiral } => (nest::offsets(piece, &spacing, monitor).map_err(failed)?, *spiral),
         Pattern::Flow(flow) => {
             let (nest, sigma) = nest::flow(piece, flow, spacing, reach, monitor).map_err(failed)?;
-            let plain = nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?.length();
+            let plain = nest::offsets(piece, &spacing, monitor).map_err(failed)?.length();
             planned.notes.push(format!(
                 "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
                 nest.length()

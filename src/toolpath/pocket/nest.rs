@@ -166,14 +166,8 @@ pub fn closed_length(curve: &[Point2]) -> f64 {
     (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
 }
 
-/// Offsets of the walls, the stepover apart; discs of the radius `reach` along the innermost ones leave
-/// nothing. Where the engagement is bounded, inner ones have round corners and turning ones lie closer.
-pub fn offsets(
-    piece: &Piece,
-    spacing: &Spacing,
-    reach: f64,
-    monitor: &dyn Monitor,
-) -> Result<Nest, NestError> {
+/// Offsets of the walls, the stepover apart. Where the engagement is bounded, inner ones have round corners and turning ones lie closer.
+pub fn offsets(piece: &Piece, spacing: &Spacing, monitor: &dyn Monitor) -> Result<Nest, NestError> {
     let step = spacing.step;
     let mut levels = vec![vec![piece.clone()]];
     let whole = Region { pieces: vec![piece.clone()] };
@@ -211,7 +205,6 @@ pub fn offsets(
         }
         inner = outer;
     }
-    debug_assert!(step < 2.0 * reach);
     Ok(inner.into_iter().next().unwrap_or(Nest {
         curves: piece.clone(),
         inner: vec![],

@@ -1,4 +1,5 @@
 mod engagement;
+mod ridges;
 
 use super::*;
 use crate::levels::halving::LevelSource;
