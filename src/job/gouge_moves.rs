@@ -35,9 +35,10 @@ pub(crate) fn name(
         let its = earlier.get(toolpath);
         let OwnMoves { path, cutters } =
             its.map_or(own, |before| OwnMoves { path: &before.path, cutters: &before.cutters });
-        region.move_index = move_index;
-        region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
-        region.tool = path.named_tool_of(move_index as usize);
+        let step = step_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
+        region.move_index = step as u32;
+        region.line = path.line_of(step).unwrap_or_default();
+        region.tool = path.named_tool_of(step);
         region.toolpath = its.map(|before| before.name.clone());
         region.program = its.map(|before| before.path.program_name().to_owned());
     }
@@ -51,16 +52,15 @@ fn came_through(whole: &WholePath<'_>, deepest: u32, at: &Point3) -> Option<u32>
     envelope.lowest(at.x, at.y, &all).map(|(_, by)| by).filter(|_| stays_above)
 }
 
-/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line
-/// before where the move begins there.
-fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
+/// The move that took the cutter to where it cuts deepest, at a place that a move cuts. That is the one before
+/// where the move begins there.
+fn step_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> usize {
     /// Places along the move; a start that is lowest by less than a share of it counts as its end.
     const PLACES: u32 = 64;
-    let line = |k: usize| path.line_of(k).unwrap_or_default();
-    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return line(step) };
+    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return step };
     let (from, to) = (path.location_before(step), this.to);
     if from.axis != Vector3::z() || to.axis != from.axis {
-        return line(step);
+        return step;
     }
     let height = |k: u32| {
         let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
@@ -68,5 +68,5 @@ fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u3
     };
     // A place at the very side of the sweep may lie beside all of these places.
     let begins = height(0).is_finite() && (1..=PLACES).all(|k| height(k) >= height(0));
-    line(if begins { before } else { step })
+    if begins { before } else { step }
 }

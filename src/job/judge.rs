@@ -54,8 +54,12 @@ pub(crate) fn each_violation_once(claims: Vec<Claim>) -> Vec<Claim> {
         |claim: &Claim| ["gouge", "uncut", "scallop"].contains(&claim.what) && claim.unit == "mm";
     for claim in claims {
         let fails = |claim: &Claim| is_surface(claim) && claim.verdict() == Verdict::Fail;
+        let is_unseen = |claim: &Claim| claim.text.ends_with(UNSEEN);
         let same = |other: &&mut Claim| {
-            fails(other) && fails(&claim) && other.what == claim.what && other.limit == claim.limit
+            fails(other)
+                && fails(&claim)
+                && (other.what, other.limit) == (claim.what, claim.limit)
+                && is_unseen(other) != is_unseen(&claim)
         };
         match once.iter_mut().find(same) {
             Some(other) => {

@@ -197,7 +197,8 @@ fn a_gouge_where_no_cell_sees_is_named_as_others_are() {
         assert_eq!(region.get("toolpath").and_then(Value::as_str), toolpath, "{gouge}");
         let text = report["toolpaths"][k]["violations"].to_string();
         let of = toolpath.map_or(", deep.nc", |_| " of the toolpath deep before this one, deep.nc");
-        assert!(text.contains(&format!("move 3{of} line 6, measured along normals")), "{text}");
+        assert!(text.contains(&format!("move 3{of} line 6; 244")), "{text}");
+        assert!(text.contains("measured along normals where no cell sees"), "{text}");
     }
 }
 

@@ -317,7 +317,9 @@ fn a_violation_that_two_find_is_listed_once() {
     assert!(deeper.len() == 1 && deeper[0].starts_with("gouge 50.0"), "{deeper:?}");
     assert!(deeper[0].ends_with("; 20.0 ± 0.50 µm measured along normals where no cell sees"), "{deeper:?}");
     assert!(less.len() == 1 && less[0].ends_with("; 20.0 ± 0.50 µm on the cells"), "{less:?}");
-    // What one of them finds stays as it is, and so does what holds.
+    // What one of them finds stays as it is, as on the floor and on the walls of a pocket, and so does what holds.
+    let both = [of(0.05, ""), of(0.02, " on the walls")].concat();
+    assert_eq!(each_violation_once(both.clone()), both);
     assert_eq!(gouges(0.02, 0.001).len(), 1);
     let held = [of(0.001, UNSEEN), of(0.001, "")].concat();
     assert_eq!(each_violation_once(held.clone()), held);
