@@ -338,7 +338,7 @@ impl<'a> Corrected<'a> {
         }
         if let Some(next) = self.along_creases(monitor)? {
             beside_cells = looked.take().and_then(Looked::beside_cells).or(beside_cells);
-            looked = self.unless_nothing_sinks(next, monitor)?;
+            looked = self.keep_if_something_sinks(next, monitor)?;
             beside_cells = beside_cells.filter(|_| looked.is_none());
         }
         let mut looked = match looked {
@@ -451,7 +451,7 @@ impl<'a> Corrected<'a> {
     }
 
     /// Plans the best plan with further passes, and keeps that where something stands lower: nothing can rise.
-    fn unless_nothing_sinks(
+    fn keep_if_something_sinks(
         &mut self,
         next: Widths,
         monitor: &dyn Monitor,
@@ -476,11 +476,10 @@ impl<'a> Corrected<'a> {
 
     /// From now on, what stands in hollows is no reason for another plan.
     fn leave_hollows(&mut self, hollows: Hollows<'a>, monitor: &dyn Monitor) -> Result<(), Cancelled> {
-        (self.goal.is_hopeless, self.hollows) = (true, Some(hollows));
-        let mut standing = self.tried.standing.clone();
-        self.set_hollows_aside(&mut standing, monitor)?;
-        self.rounds[self.kept] = standing.round;
-        self.tried.standing = standing;
+        self.goal.is_hopeless = true;
+        let hollows = self.hollows.insert(hollows);
+        self.tried.standing.set_aside(hollows, self.goal.target, monitor)?;
+        self.rounds[self.kept] = self.tried.standing.round;
         self.remember_best();
         Ok(())
     }
