@@ -100,6 +100,7 @@ fn execute(command: &Command, progress: &Progress) -> Result<(String, Verdict), 
         Command::Run(options) => {
             if options.until_stdin_closes {
                 signals::end_with_stdin(COULD_NOT_RUN);
+                progress.watched().tell_nobody();
             }
             let report = run::run(options, progress)?;
             Ok((report.text, report.verdict))

@@ -1,5 +1,5 @@
-//! A thread that ends what does not answer: a run that was asked to stop, and one that takes more memory than
-//! it may.
+//! A thread that ends what does not answer, a run that was asked to stop or one that takes more memory than it may,
+//! and that tells a log how far long work is.
 //!
 //! Long work asks its monitor whether to go on, and answers within milliseconds. What has to hold whatever
 //! the work does is held here: the process ends soon after a signal, and its memory stays within what the
@@ -14,8 +14,10 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
 
+use report::duration;
+
 use super::error::CliError;
-use super::system;
+use super::{system, to_stderr};
 
 /// How often memory and wishes are looked at. Longer lets a run take more memory unseen; each look takes some
 /// 20 µs.
@@ -24,6 +26,9 @@ const LOOK: Duration = Duration::from_millis(5);
 /// A run that has not answered after this time is ended. Longer is felt as hanging; shorter ends work that
 /// would have put its scratch files away.
 const ANSWER: Duration = Duration::from_millis(700);
+
+/// How often a log is told what is being done. More often fills it; more seldom looks like hanging.
+const TOLD: Duration = Duration::from_secs(30);
 
 /// What the program takes beside the memory that a scene allows, MiB: its stacks, its tables, and what its
 /// allocator keeps; and what the allocator keeps for each further thread. Less stops small runs, more lets a
@@ -43,6 +48,8 @@ pub struct Watched {
     /// Memory that the process may take, bytes.
     most: AtomicU64,
     too_much: AtomicBool,
+    /// Nobody is told what is being done: what stderr takes is another program's.
+    silent: AtomicBool,
     /// The results are on their way to their place: nothing ends the process any more but a second signal.
     committed: AtomicBool,
 }
@@ -53,6 +60,11 @@ impl Watched {
         let besides = BESIDES + A_THREAD * (threads as u64).saturating_sub(1);
         self.allowed_mib.store(mib.into(), Ordering::Relaxed);
         self.most.store((u64::from(mib) + besides) * MIB, Ordering::Relaxed);
+    }
+
+    /// From now on nobody is told what is being done.
+    pub fn tell_nobody(&self) {
+        self.silent.store(true, Ordering::Relaxed);
     }
 
     /// From now on the run is not ended for being slow.
@@ -85,11 +97,21 @@ pub fn begin(watched: &Arc<Watched>, bar: &ProgressBar) {
 }
 
 fn watch(watched: &Watched, bar: &ProgressBar) {
+    let (begun, mut told) = (Instant::now(), 0);
     let mut asked: Option<Instant> = None;
     loop {
         std::thread::sleep(LOOK);
         if watched.committed.load(Ordering::Relaxed) {
             return;
+        }
+        // The bar shows nothing where stderr is no terminal.
+        let passed = begun.elapsed();
+        if bar.is_hidden() && passed >= (told + 1) * TOLD {
+            told += 1;
+            if !watched.silent.load(Ordering::Relaxed) {
+                // Where stderr takes nothing, nobody reads it.
+                let _ = to_stderr(&told_of(bar, passed));
+            }
         }
         if !watched.too_much.load(Ordering::Relaxed)
             && written().is_some_and(|now| watched.takes_too_much(now))
@@ -108,6 +130,14 @@ fn watch(watched: &Watched, bar: &ProgressBar) {
     }
 }
 
+/// What is being done, how much of it is done, and for how long the run has been at work.
+fn told_of(bar: &ProgressBar, passed: Duration) -> String {
+    let steps = bar.length().unwrap_or(0);
+    let share = (100 * bar.position().min(steps)).checked_div(steps);
+    let share = share.map_or_else(String::new, |share| format!(" {share} %"));
+    format!("{}  {}{share}\n", duration(passed.as_secs_f64()), bar.message())
+}
+
 /// Memory that the process has written to and holds now, bytes.
 fn written() -> Option<u64> {
     system::kib(&system::text("self/status"), "RssAnon").map(|kib| 1024 * kib)
@@ -124,6 +154,16 @@ mod tests {
         let held = vec![1u8; 64 * MIB as usize];
         assert!(written().unwrap() >= before + 32 * MIB, "{before}");
         drop(std::hint::black_box(held));
+    }
+
+    #[test]
+    fn a_log_is_told_what_is_being_done() {
+        let bar = ProgressBar::hidden();
+        bar.set_message("wave: cutting");
+        assert_eq!(told_of(&bar, Duration::from_secs(30)), "30.0 s  wave: cutting\n");
+        bar.set_length(8);
+        bar.inc(3);
+        assert_eq!(told_of(&bar, Duration::from_secs(90)), "1:30  wave: cutting 37 %\n");
     }
 
     #[test]
