@@ -22,6 +22,7 @@ use ::nightly::{
 use io::{digest, regular};
 use report::Verdict;
 use scene::{EngineChoice, printable_lines};
+use work::monitor;
 
 use super::args::NightlyOptions;
 use super::error::{CliError, shown};
@@ -56,6 +57,7 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
         None => Plan::new(options, &rules, &published, baseline.as_ref())?,
     };
     let outputs = Outputs::begin(&options.out, &claims(options, &plan))?;
+    progress.watched().discard_by(outputs.discarding());
     let results = match merged {
         Some(shards) => merge::merge(shards, &options.out)?,
         None => {
@@ -63,6 +65,8 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
             Results::new(env!("CARGO_PKG_VERSION"), date_of(now()), options.shard, scenes)
         }
     };
+    monitor::check(progress)?;
+    progress.watched().commit();
     let history = match &options.history {
         Some(path) => history::append(path, &night(&results)?)?,
         None => History::default(),

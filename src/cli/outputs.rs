@@ -141,6 +141,19 @@ impl Outputs {
         Ok(Self { place, old, digests: Mutex::default(), _lock: lock, _made: made })
     }
 
+    /// Removes, from any thread, what a run would leave that ends now. What is still written meanwhile may stay for
+    /// the next run.
+    pub fn discarding(&self) -> impl FnOnce() + Send + use<> {
+        /// Files that others write may keep a folder from being removed.
+        const TIMES: usize = 3;
+        let place = ResultsPlace { target: self.place.target.clone(), disk: Disk::default() };
+        let made = self._made.0.clone();
+        move || {
+            let _ = (0..TIMES).any(|_| place.settle().is_ok());
+            drop(MadeFolders(made));
+        }
+    }
+
     fn staged(&self, name: &str) -> PathBuf {
         self.place.staging().join(NEW).join(name)
     }

@@ -103,6 +103,7 @@ pub struct Target {
 pub fn run_scene(scene: Scene, to: &Target, progress: &Progress) -> Result<RunOutcome, CliError> {
     let target = &to.target;
     let outputs = Outputs::begin(target, &claims(&to.inputs, &scene))?;
+    progress.watched().discard_by(outputs.discarding());
     progress.watched().allow_memory(scene.simulation.memory_mib, work::parallel::threads());
     let session = Session::load(scene, progress)?;
     let mut pages = Vec::new();

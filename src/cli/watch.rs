@@ -7,9 +7,10 @@
 //! Only memory that the process wrote counts: the system takes back the pages of the program's own file when
 //! it needs them. It is known on Linux only.
 
+use std::fmt;
 use std::process::exit;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
@@ -24,7 +25,7 @@ use super::{system, to_stderr};
 const LOOK: Duration = Duration::from_millis(5);
 
 /// A run that has not answered after this time is ended. Longer is felt as hanging; shorter ends work that
-/// would have put its scratch files away.
+/// was about to answer.
 const ANSWER: Duration = Duration::from_millis(700);
 
 /// How often a log is told what is being done. More often fills it; more seldom looks like hanging.
@@ -38,6 +39,16 @@ const A_THREAD: u64 = 1;
 
 const MIB: u64 = 1 << 20;
 
+/// What is done before a run is ended that does not answer.
+#[derive(Default)]
+struct Discarding(Option<Box<dyn FnOnce() + Send>>);
+
+impl fmt::Debug for Discarding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Discarding")
+    }
+}
+
 /// What the run and its watch know of each other.
 #[derive(Debug, Default)]
 pub struct Watched {
@@ -50,6 +61,7 @@ pub struct Watched {
     too_much: AtomicBool,
     /// Nobody is told what is being done: what stderr takes is another program's.
     silent: AtomicBool,
+    discarding: Mutex<Discarding>,
     /// The results are on their way to their place: nothing ends the process any more but a second signal.
     committed: AtomicBool,
 }
@@ -60,6 +72,20 @@ impl Watched {
         let besides = BESIDES + A_THREAD * (threads as u64).saturating_sub(1);
         self.allowed_mib.store(mib.into(), Ordering::Relaxed);
         self.most.store((u64::from(mib) + besides) * MIB, Ordering::Relaxed);
+    }
+
+    /// What removes the results that were begun, should the run be ended.
+    pub fn discard_by(&self, discarding: impl FnOnce() + Send + 'static) {
+        if let Ok(mut known) = self.discarding.lock() {
+            known.0 = Some(Box::new(discarding));
+        }
+    }
+
+    /// Removes the results that were begun.
+    fn discard(&self) {
+        if let Ok(Some(discarding)) = self.discarding.lock().map(|mut known| known.0.take()) {
+            discarding();
+        }
     }
 
     /// From now on nobody is told what is being done.
@@ -124,7 +150,7 @@ fn watch(watched: &Watched, bar: &ProgressBar) {
         }
         if asked.get_or_insert_with(Instant::now).elapsed() > ANSWER {
             bar.finish_and_clear();
-            // The next run puts away what this one leaves.
+            watched.discard();
             exit(super::report_error(&watched.reason()).into());
         }
     }
@@ -164,6 +190,19 @@ mod tests {
         bar.set_length(8);
         bar.inc(3);
         assert_eq!(told_of(&bar, Duration::from_secs(90)), "1:30  wave: cutting 37 %\n");
+    }
+
+    #[test]
+    fn what_was_begun_is_discarded_once() {
+        let watched = Watched::default();
+        let count = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&count);
+        watched.discard_by(move || {
+            counted.fetch_add(1, Ordering::Relaxed);
+        });
+        watched.discard();
+        watched.discard();
+        assert_eq!(count.load(Ordering::Relaxed), 1);
     }
 
     #[test]

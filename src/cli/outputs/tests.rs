@@ -100,6 +100,24 @@ fn nothing_appears_when_a_run_stops_early() {
 }
 
 #[test]
+fn a_run_that_does_not_answer_leaves_nothing_either() {
+    let home = tempfile::tempdir().unwrap();
+    let target = home.path().join("deep/out");
+    let outputs = fill(&target, "text");
+    let discarding = outputs.discarding();
+    assert_eq!(entries(&target), [STAGING]);
+    std::thread::spawn(discarding).join().unwrap();
+    assert_eq!(entries(home.path()), [""; 0]);
+    // The process ends before the run can drop what it holds.
+    std::mem::forget(outputs);
+    // Results of an earlier run stay.
+    fill(&target, "first").publish().unwrap();
+    let outputs = fill(&target, "second");
+    outputs.discarding()();
+    assert_eq!(entries(&target), ["millstream.sha256", "report.json", "zigzag"]);
+}
+
+#[test]
 fn a_second_run_waits_its_turn() {
     let home = tempfile::tempdir().unwrap();
     let living = fill(home.path(), "text");
