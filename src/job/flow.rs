@@ -243,7 +243,13 @@ impl Session {
         let (limits, rule) = (&scene.tolerance, &scene.scallop_rule);
         let claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
         let mut claims = judge::each_violation_once(claims);
-        judge::name_strays(&mut claims, path.origin.strays);
+        let [lesser_arcs, lesser_chord, other_lines] = judge::LESS_STRAYING;
+        let less = match (run.request.foreign(), scene.arcs) {
+            (Some(_), _) => other_lines,
+            (None, Some(_)) => lesser_arcs,
+            (None, None) => lesser_chord,
+        };
+        judge::name_strays(&mut claims, path.origin.strays, less);
         if let Some(read) = run.request.foreign() {
             claims = figures::with_lengths_open(claims, &read.findings);
         }

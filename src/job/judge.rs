@@ -79,19 +79,23 @@ pub(crate) fn each_violation_once(claims: Vec<Claim>) -> Vec<Claim> {
 /// What the sentence of a claim ends with that is not of cells.
 pub(crate) const UNSEEN: &str = ", measured along normals where no cell sees";
 
-/// What decides a claim that cells cannot.
-const STRAYS: &str = "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine], or shorter moves where axes \
-                      turn, would decide it";
+/// What decides claims that cells cannot: of plans with arcs, of plans whose axes turn, and of programs.
+pub(crate) const LESS_STRAYING: [&str; 3] = [
+    "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine] would decide it",
+    "the tool strays by as much between the lines of the program: a lesser `chord` in [tolerance] would decide it",
+    "the tool strays by as much between the lines of the program: lines for arcs, and shorter ones where axes turn, would \
+     decide it",
+];
 
 /// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves
-/// that are measured.
-pub(crate) fn name_strays(claims: &mut [Claim], strays: f64) {
+/// that are measured; and which of [`LESS_STRAYING`] would decide them.
+pub(crate) fn name_strays(claims: &mut [Claim], strays: f64, less: &'static str) {
     let hangs_on_it = |claim: &Claim| {
         let nearer = Claim { error_bound: claim.error_bound - strays, ..claim.clone() };
         claim.unit == "mm" && claim.verdict() == Verdict::Undecided && nearer.verdict() != Verdict::Undecided
     };
     for claim in claims.iter_mut().filter(|claim| strays > 0.0 && hangs_on_it(claim)) {
-        claim.decided_by = STRAYS;
+        claim.decided_by = less;
     }
 }
 
