@@ -326,6 +326,49 @@ fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower
     }
 }
 
+/// A wedge of 15 degrees whose one face is cut to size, or a little deeper, while stock stands on the other: lines
+/// along the normals of that run through the wedge, and come out where the first face was cut.
+#[test]
+fn what_stands_beside_a_sharp_edge_is_as_high_as_elsewhere() {
+    let (slope, high) = (7.5f64.to_radians().tan(), 0.2);
+    let corners = [[0.0, 0.0], [1.0, slope], [1.0, -slope]];
+    let corners = corners.iter().flat_map(|&[y, z]| [0.0, 1.0].map(|x| Point3::new(x, y, z))).collect();
+    let triangles = vec![[0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1]];
+    let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+    let [upper, lower] = [1.0, -1.0].map(|up| Vector3::new(0.0, -slope, up).normalize());
+    let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+    let solid = Solid::of_cutter(&ball, None);
+    for deep in [0.0, 1e-3] {
+        // Each face with a tool that stands upright on it.
+        let faces = [(1.0, upper * (RADIUS + high)), (-1.0, lower * (RADIUS - deep))];
+        let mut moves = Vec::new();
+        for (pass, (up, off)) in (0..40).flat_map(|k| faces.map(|face| (k, face))) {
+            let y = 0.05 * f64::from(pass) - 0.5;
+            for (x, kind) in [(-4.0, MoveKind::Rapid), (8.0, MoveKind::Cut)] {
+                let (centre, axis) = (Point3::new(x, y, up * slope * y) + off, Vector3::z() * up);
+                let to = ClPoint { tip: centre - axis * RADIUS, axis };
+                moves.push(Move { to, kind, feed_rate: 1000.0, pass });
+            }
+        }
+        let path = Toolpath::new(moves[0].to, moves);
+        let rays = Rays::new(&path, &solid, &Silent).unwrap();
+        let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+        let cut = swept(&part, &by_rays, 1.0);
+        // Between two passes a little more.
+        let holds = |height: f64| height >= high - 1e-9 && height <= high + 0.025f64.powi(2) / RADIUS;
+        for y in [0.0, 1e-7, 1e-5, 1e-3, 0.01, 0.1, 0.5] {
+            let hit = cut.hit(&Point3::new(0.4, y, slope * y), &upper, None).unwrap();
+            assert!(holds(hit.deviation), "{deep} {y}: {hit:?}");
+        }
+        let (found, _) =
+            measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-3, None, &Silent).unwrap();
+        let (uncut, gouge) = (&found.uncut, &found.gouge);
+        assert!(holds(uncut.max_height_mm) && uncut.error_bound_mm < 1e-3, "{deep}: {uncut:?}");
+        assert!((uncut.area_mm2 - slope.hypot(1.0)).abs() < 0.01, "{deep}: {uncut:?}");
+        assert!(gouge.max_depth_mm - gouge.error_bound_mm <= 8.0 * deep, "{deep}: {gouge:?}");
+    }
+}
+
 /// A ball that dips into the corner of a block: lines along the walls, and along the middle of both walls,
 /// graze what it took of the top.
 #[test]
