@@ -37,33 +37,39 @@ impl RimSamples {
     /// the radius) of a place. The order of the shapes changes.
     pub fn covered<T>(
         &self,
-        [a, b]: [Vector2; 2],
+        ends: [Vector2; 2],
         radius: f64,
         shapes: &mut [T],
         covers: impl Fn(&T, &Vector2) -> bool,
     ) -> bool {
+        self.first_bare(ends, radius, shapes, covers).is_none()
+    }
+
+    /// As [`RimSamples::covered`]: the first sample of the rim that no shape covers, if there is one.
+    pub fn first_bare<T>(
+        &self,
+        [a, b]: [Vector2; 2],
+        radius: f64,
+        shapes: &mut [T],
+        covers: impl Fn(&T, &Vector2) -> bool,
+    ) -> Option<Vector2> {
         let along = b - a;
         let length = along.norm();
-        let mut held = |p: Vector2| {
+        let mut is_bare = |p: &Vector2| {
             // Mostly it is the shape that covers the place before.
-            let found = shapes.iter().position(|shape| covers(shape, &p));
-            found.is_some_and(|k| {
-                shapes.swap(0, k);
-                true
-            })
+            let found = shapes.iter().position(|shape| covers(shape, p));
+            found.inspect(|k| shapes.swap(0, *k)).is_none()
         };
         let on_rounds = |out: &Vector2| (if out.dot(&along) > 0.0 { b } else { a }) + out * radius;
-        if !self.directions.iter().all(|out| held(on_rounds(out))) {
-            return false;
-        }
-        if length == 0.0 {
-            return true;
+        let bare = self.directions.iter().map(on_rounds).find(&mut is_bare);
+        if bare.is_some() || length == 0.0 {
+            return bare;
         }
         let across = Vector2::new(-along.y, along.x) * (radius / length);
         let steps = (length / (2.0 * Self::MARGIN * radius)).ceil();
-        let on_sides = (0..=steps as usize)
+        let mut on_sides = (0..=steps as usize)
             .flat_map(|k| [1.0, -1.0].map(|side| a + along * (k as f64 / steps) + across * side));
-        on_sides.into_iter().all(held)
+        on_sides.find(is_bare)
     }
 }
 

@@ -19,12 +19,17 @@
 //! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in
 //! what else was is left out from then on: loops and passes over cleared ground are most of a long path.
 
+mod near;
+mod thin;
+
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::sync::LazyLock;
+use std::ops::Range;
+use std::slice::from_ref;
 
 use cutter::Cutter;
 use geometry::{Point2, RegionIndex, RimSamples, Vector2};
 use motion::{Move, MoveKind, Toolpath};
+use near::Bundle;
 use sim::{ENGAGED, Stock};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -43,11 +48,6 @@ const HALVINGS: u32 = 12;
 
 /// A bound that exceeds the greatest angle by no more is good enough, rad.
 const PRECISE: f64 = 0.02 * PI / 180.0;
-
-/// Parts of the half circle: a segment that is near to none in which anything stands clears nothing. Longer
-/// parts let pass more segments, shorter ones are more to ask for.
-const PARTS: usize = 24;
-const PART: f64 = PI / PARTS as f64;
 
 /// Shorter arcs, rad, and nearer places, over the radius, are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -110,12 +110,7 @@ pub fn contact_arcs(
         let first = of_moves.len();
         cleared.thin(first);
         let count_of = BLOCK.min(path.len() - first);
-        let stretches = work::parallel::try_map(count_of, |k| {
-            monitor::check(monitor)?;
-            let stretches = cleared.stretches(path, top, first + k);
-            let near = if stretches.is_empty() { Vec::new() } else { cleared.near_move(first + k) };
-            Ok(cleared.looked_at(&stretches, &near))
-        })?;
+        let stretches = cleared.all_looked_at(path, top, first..first + count_of, monitor)?;
         of_moves.extend(stretches.iter().map(|all| all.iter().map(|one| one.found).fold(0.0, f64::max)));
         let counted: Vec<bool> = path.moves[first..first + count_of].iter().map(count).collect();
         let greatest_of = |found: &[f64]| {
@@ -127,7 +122,7 @@ pub fn contact_arcs(
             monitor::check(monitor)?;
             let of_counted = stretches[k].iter().filter(|_| counted[k]);
             let each = of_counted
-                .map(|one| cleared.bounded(&one.stretch, one.most, &one.deciding, greatest, HALVINGS));
+                .map(|one| cleared.bounded(&one.stretch, one.most, one.deciding(), greatest, HALVINGS));
             Ok(each.fold([0.0f64; 2], |most, one| [0, 1].map(|side| most[side].max(one[side]))))
         })?;
         for (k, [least, most]) in bounds.into_iter().enumerate() {
@@ -188,7 +183,13 @@ struct Looked {
     found: f64,
     most: f64,
     /// The segments that decide about every place of it, the last first.
-    deciding: Vec<u32>,
+    deciding: Bundle,
+}
+
+impl Looked {
+    fn deciding(&self) -> &[Bundle] {
+        from_ref(&self.deciding)
+    }
 }
 
 /// A straight way of the cutter's axis.
@@ -220,6 +221,8 @@ struct Swept<'a> {
     settled: usize,
     /// How many of them thinning left in each bucket.
     left: Vec<usize>,
+    /// By segment: how many were settled when it was looked at, and where its rim was bare then.
+    bare: Vec<Option<(u32, Vector2)>>,
 }
 
 impl<'a> Swept<'a> {
@@ -258,6 +261,7 @@ impl<'a> Swept<'a> {
             rim: RimSamples::new(),
             settled: 0,
             left: vec![0; side[0] * side[1]],
+            bare: vec![None; segments.len()],
         };
         for (k, segment) in segments.iter().enumerate() {
             for at in swept.buckets_of(segment.ends) {
@@ -281,69 +285,16 @@ impl<'a> Swept<'a> {
         all
     }
 
-    /// Leaves out segments that lie whole in others: those of both that no place of move `from` or later may
-    /// find fresh. Every angle, and every bound of a stretch, stays the same. Looks at those in buckets with
-    /// twice as many as it left there.
-    fn thin(&mut self, from: usize) {
-        /// Fewer are no matter.
-        const FEW: usize = 24;
-        let before = self.segments[from].gone[0] - self.fresh;
-        let settled =
-            self.settled + self.segments[self.settled..from].partition_point(|s| s.gone[1] < before);
-        self.settled = settled;
-        let settled_in = |bucket: &Vec<u32>| bucket.partition_point(|&k| (k as usize) < settled);
-        let full: Vec<usize> = (0..self.buckets.len())
-            .filter(|&at| settled_in(&self.buckets[at]) >= 2 * self.left[at] + FEW)
-            .collect();
-        let mut looked_at: Vec<u32> =
-            full.iter().flat_map(|&at| &self.buckets[at][..settled_in(&self.buckets[at])]).copied().collect();
-        looked_at.sort_unstable();
-        looked_at.dedup();
-        let radius = (1.0 + self.film) * self.radius;
-        let within = (radius * (1.0 - RimSamples::MARGIN)).powi(2);
-        let mut near = Vec::new();
-        for k in looked_at {
-            let Segment { ends: [a, b], z, .. } = self.segments[k as usize];
-            if (b - a).norm() > SHORT * self.radius {
-                continue;
-            }
-            let middle = a + 0.5 * (b - a);
-            near.clear();
-            self.each_near(&middle, radius, |other| {
-                if other >= settled {
-                    return false;
-                }
-                let segment = &self.segments[other];
-                let ends = segment.ends.map(|p| p - middle);
-                if other != k as usize
-                    && segment.z <= z
-                    && square_distance(&Vector2::zeros(), &ends) <= within
-                {
-                    near.push(ends);
-                }
-                true
-            });
-            let covers = |ends: &[Vector2; 2], p: &Vector2| square_distance(p, ends) <= within;
-            if self.rim.covered([a, b].map(|p| p - middle), radius, &mut near, covers) {
-                for at in self.buckets_of([a, b]) {
-                    self.buckets[at].retain(|&other| other != k);
-                }
-            }
-        }
-        for at in full {
-            self.left[at] = settled_in(&self.buckets[at]);
-        }
-    }
-
-    /// Tells the segments that may come so near to a place, bucket by bucket in the order of the path, until
-    /// `tell` has enough of a bucket.
-    fn each_near(&self, place: &Point2, reach: f64, mut tell: impl FnMut(usize) -> bool) {
+    /// Tells the segments from `first` on that may come so near to a place, bucket by bucket in the order of the
+    /// path, until `tell` has enough of a bucket.
+    fn each_near(&self, place: &Point2, reach: f64, first: usize, mut tell: impl FnMut(usize) -> bool) {
         let reach = Vector2::new(1.0, 1.0) * (reach + self.bucket);
         let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
         for j in self.column(1, lo.y)..=self.column(1, hi.y) {
             for i in self.column(0, lo.x)..=self.column(0, hi.x) {
                 let bucket = &self.buckets[j * self.side[0] + i];
-                let _ = bucket.iter().all(|&k| tell(k as usize));
+                let from = if first == 0 { 0 } else { bucket.partition_point(|&k| (k as usize) < first) };
+                let _ = bucket[from..].iter().all(|&k| tell(k as usize));
             }
         }
     }
@@ -352,14 +303,16 @@ impl<'a> Swept<'a> {
         ((at / self.bucket).floor().max(0.0) as usize).min(self.side[axis] - 1)
     }
 
+    /// The direction of a move that feeds sideways below the stock's top.
+    fn heading(&self, path: &Toolpath, top: f64, k: usize) -> Option<Vector2> {
+        let Segment { ends: [a, b], z, .. } = self.segments[k];
+        (b - a).try_normalize(0.0).filter(|_| path.moves[k].kind != MoveKind::Rapid && z < top)
+    }
+
     /// A move that feeds sideways below the stock's top, in stretches.
     fn stretches(&self, path: &Toolpath, top: f64, k: usize) -> Vec<Stretch> {
-        let Segment { ends: [a, b], z, gone } = self.segments[k];
-        let Some(heading) =
-            (b - a).try_normalize(0.0).filter(|_| path.moves[k].kind != MoveKind::Rapid && z < top)
-        else {
-            return Vec::new();
-        };
+        let Segment { ends: [a, _], z, gone } = self.segments[k];
+        let Some(heading) = self.heading(path, top, k) else { return Vec::new() };
         let length = gone[1] - gone[0];
         let count = (length / (STRETCH * self.radius)).ceil().max(1.0);
         let half = 0.5 * length / count;
@@ -373,27 +326,55 @@ impl<'a> Swept<'a> {
     }
 
     /// The angle so far from the middle of a stretch, mm.
-    fn at(&self, stretch: &Stretch, by: f64, near: &[u32]) -> f64 {
+    fn at(&self, stretch: &Stretch, by: f64, near: &[Bundle]) -> f64 {
         let (middle, gone) = (stretch.middle + stretch.heading * by, stretch.gone + by);
         self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch }, near)
     }
 
+    /// Looks at the stretches of each of these moves.
+    fn all_looked_at(
+        &self,
+        path: &Toolpath,
+        top: f64,
+        moves: Range<usize>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Vec<Looked>>, Cancelled> {
+        let rows = self.rows(moves.clone(), |k| self.heading(path, top, k).is_some());
+        let of_rows = work::parallel::try_map(rows.len(), |row| {
+            monitor::check(monitor)?;
+            let deciding = self.deciding_for(&rows[row]);
+            let looked_at = |k: &usize| self.looked_at(&self.stretches(path, top, *k), &deciding);
+            Ok(rows[row].moves.iter().map(looked_at).collect::<Vec<_>>())
+        })?;
+        let first = moves.start;
+        let mut all: Vec<Vec<Looked>> = moves.map(|_| Vec::new()).collect();
+        for (row, of_row) in rows.iter().zip(of_rows) {
+            row.moves.iter().zip(of_row).for_each(|(k, looked_at)| all[k - first] = looked_at);
+        }
+        Ok(all)
+    }
+
     /// Looks at those stretches of a move that may meet stock, each from both ends.
-    fn looked_at(&self, stretches: &[Stretch], near: &[u32]) -> Vec<Looked> {
+    fn looked_at(&self, stretches: &[Stretch], near: &[Bundle]) -> Vec<Looked> {
         let Some(first) = stretches.first() else { return Vec::new() };
         let together = ((0.5 * SHORT * self.radius / first.half) as usize).max(1);
         // One stretch begins where another one ends.
         let mut last: Option<(f64, f64)> = None;
         let parts = stretches.chunks(together).flat_map(|part| {
             let (most, near) = self.deciding(&Stretch::over(part), near);
+            let alone = part.len() == 1;
             let part = if most > 0.0 { part } else { &[] };
             let looked_at = part.iter().map(|stretch| {
-                let (most, deciding) = self.deciding(stretch, &near);
+                let (most, deciding) =
+                    if alone { (most, near.clone()) } else { self.deciding(stretch, from_ref(&near)) };
                 let begin = stretch.gone - stretch.half;
                 let known = last.filter(|(gone, _)| (gone - begin).abs() < TOUCHING * self.radius);
                 let ends = [
-                    known.map_or_else(|| self.at(stretch, -stretch.half, &deciding), |(_, angle)| angle),
-                    self.at(stretch, stretch.half, &deciding),
+                    known.map_or_else(
+                        || self.at(stretch, -stretch.half, from_ref(&deciding)),
+                        |(_, angle)| angle,
+                    ),
+                    self.at(stretch, stretch.half, from_ref(&deciding)),
                 ];
                 last = Some((stretch.gone + stretch.half, ends[1]));
                 Looked { stretch: *stretch, found: ends[0].max(ends[1]), most, deciding }
@@ -404,23 +385,32 @@ impl<'a> Swept<'a> {
     }
 
     /// What the angle is at most anywhere on a stretch, and the segments that decide about every place of it.
-    fn deciding(&self, stretch: &Stretch, near: &[u32]) -> (f64, Vec<u32>) {
+    fn deciding(&self, stretch: &Stretch, near: &[Bundle]) -> (f64, Bundle) {
         let mut taking = Vec::new();
         let front = self.front(stretch, near, |k| taking.push(k));
         // What those that took some cover from both ends they cover from everywhere between. Others can only
         // matter where the rest stands.
-        let reach = (1.0 + self.film) * self.radius + stretch.half;
+        let (reach, end) = ((1.0 + self.film) * self.radius + stretch.half, stretch.gone + stretch.half);
         let mut took = taking.iter().copied().peekable();
-        let matters = |k: &u32| {
-            took.next_if_eq(k).is_some()
-                || front.may_clear(&self.segments[*k as usize].ends.map(|p| stretch.seen(&p)), reach)
-        };
-        (front.angle(), near.iter().copied().filter(matters).collect())
+        let mut segments = Vec::new();
+        for bundle in near {
+            let may_clear = bundle.may_clear(&front, stretch, reach);
+            if !may_clear && took.peek().is_none_or(|k| !bundle.may_hold(*k)) {
+                continue;
+            }
+            let matters = |k: &u32| {
+                let Segment { ends, gone, .. } = &self.segments[*k as usize];
+                took.next_if_eq(k).is_some()
+                    || may_clear && gone[0] <= end && front.may_clear(&ends.map(|p| stretch.seen(&p)), reach)
+            };
+            segments.extend(bundle.segments.iter().copied().filter(matters));
+        }
+        (front.angle(), Bundle { around: None, segments })
     }
 
     /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`. It is known to be
     /// `most` at most.
-    fn bounded(&self, stretch: &Stretch, most: f64, near: &[u32], enough: f64, halvings: u32) -> [f64; 2] {
+    fn bounded(&self, stretch: &Stretch, most: f64, near: &[Bundle], enough: f64, halvings: u32) -> [f64; 2] {
         if most <= enough + PRECISE {
             return [0.0, most.max(enough)];
         }
@@ -436,13 +426,13 @@ impl<'a> Swept<'a> {
     }
 
     /// The angle of the front half of the circumference in stock, at most anywhere on a stretch.
-    fn standing(&self, stretch: &Stretch, near: &[u32]) -> f64 {
+    fn standing(&self, stretch: &Stretch, near: &[Bundle]) -> f64 {
         self.front(stretch, near, |_| ()).angle()
     }
 
     /// The front half of the circumference without what is cleared from everywhere on a stretch. Tells the
     /// segments that clear some.
-    fn front(&self, stretch: &Stretch, near: &[u32], mut tell: impl FnMut(u32)) -> Front {
+    fn front(&self, stretch: &Stretch, near: &[Bundle], mut tell: impl FnMut(u32)) -> Front {
         let gone = stretch.gone - stretch.half;
         let before = gone - self.fresh;
         let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + self.film) * self.radius);
@@ -450,48 +440,30 @@ impl<'a> Swept<'a> {
         if let Some((region, _)) = self.before.filter(|_| stretch.over_floor) {
             front.clear_region(region, stretch, stretch.half - self.film * self.radius);
         }
-        for &k in near {
-            let segment = &self.segments[k as usize];
-            if segment.gone[0] > gone {
+        for bundle in near {
+            if !bundle.may_clear(&front, stretch, earlier) {
                 continue;
             }
-            let mut took = false;
-            for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
-                if let Some(ends) = segment.between(ways) {
-                    took |= front.clear(&ends.map(|p| stretch.seen(&p)), radius, stretch.half);
+            for &k in &bundle.segments {
+                let segment = &self.segments[k as usize];
+                if segment.gone[0] > gone {
+                    continue;
                 }
-            }
-            if took {
-                tell(k);
-            }
-            if front.standing.is_empty() {
-                break;
+                let mut took = false;
+                for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
+                    if let Some(ends) = segment.between(ways) {
+                        took |= front.clear(&ends.map(|p| stretch.seen(&p)), radius, stretch.half);
+                    }
+                }
+                if took {
+                    tell(k);
+                }
+                if front.standing.is_empty() {
+                    return front;
+                }
             }
         }
         front
-    }
-
-    /// The segments up to move `k` that a place of it can meet, the last first: the ground next to a place
-    /// was mostly cleared last, and what it leaves standing is soon so little that most others are passed
-    /// over.
-    fn near_move(&self, k: usize) -> Vec<u32> {
-        let Segment { ends: [a, b], z, .. } = self.segments[k];
-        let (middle, reach) = (a + 0.5 * (b - a), (2.0 + self.film) * self.radius + 0.5 * (b - a).norm());
-        let mut near = Vec::new();
-        self.each_near(&middle, reach, |other| {
-            let segment = &self.segments[other];
-            let ends = segment.ends.map(|p| p - middle);
-            if other <= k
-                && segment.z <= z + ENGAGED
-                && square_distance(&Vector2::zeros(), &ends) <= reach * reach
-            {
-                near.push(other as u32);
-            }
-            other <= k
-        });
-        near.sort_unstable_by(|a, b| b.cmp(a));
-        near.dedup();
-        near
     }
 }
 
@@ -513,10 +485,8 @@ struct Front {
     rim: f64,
     /// Arcs from the right to the left, rad.
     standing: Vec<[f64; 2]>,
-    /// Middles of the parts of the half circle in which any of them lies, mm.
-    parts: Vec<Vector2>,
-    /// How far a part reaches from its middle, mm.
-    reach: f64,
+    /// Where each of them begins and ends, mm.
+    ends: Vec<[Vector2; 2]>,
     /// Where the first arc begins and the last one ends, and how far to the left that is, mm.
     span: Option<[f64; 2]>,
     across: [f64; 2],
@@ -530,8 +500,7 @@ impl Front {
         Self {
             rim,
             standing: vec![whole],
-            parts: part_middles().map(|middle| middle * rim).collect(),
-            reach: 0.5 * PART * rim,
+            ends: vec![[Vector2::new(0.0, -rim), Vector2::new(0.0, rim)]],
             span: Some(whole),
             across: [-rim, rim],
             angles: Vec::new(),
@@ -542,17 +511,11 @@ impl Front {
         self.standing.iter().map(|[from, to]| to - from).sum()
     }
 
-    /// Forgets parts in which nothing stands any more.
-    fn divide(&mut self) {
+    /// Finds where what stands begins and ends.
+    fn find_ends(&mut self) {
         self.span = self.standing.first().zip(self.standing.last()).map(|(first, last)| [first[0], last[1]]);
         self.across = self.span.unwrap_or_default().map(|angle| self.at(angle).y);
-        self.parts.clear();
-        for (k, middle) in part_middles().enumerate() {
-            let [from, to] = [k, k + 1].map(|k| k as f64 * PART - FRAC_PI_2);
-            if self.stands_between(from - ROUNDING, to + ROUNDING) {
-                self.parts.push(middle * self.rim);
-            }
-        }
+        self.ends = self.standing.iter().map(|arc| arc.map(|angle| self.at(angle))).collect();
     }
 
     fn stands_between(&self, from: f64, to: f64) -> bool {
@@ -600,7 +563,7 @@ impl Front {
         }
         angles.clear();
         if taken {
-            self.divide();
+            self.find_ends();
         }
         taken
     }
@@ -630,10 +593,18 @@ impl Front {
         });
     }
 
-    /// Whether a segment is near enough to clear any part.
+    /// Whether a segment is near enough to clear any arc. A place of the segment that is so near to an arc, and
+    /// to neither of its ends, lies in a direction between them.
     fn may_clear(&self, ends: &[Vector2; 2], radius: f64) -> bool {
-        let square = (radius + self.reach).powi(2);
-        self.parts.iter().any(|middle| square_distance(middle, ends) < square)
+        let rounding = TOUCHING * self.rim;
+        let square = (radius + rounding).powi(2);
+        let is_near = |place: &Vector2| square_distance(place, ends) < square;
+        let is_between = |[from, to]: &[Vector2; 2]| {
+            let beyond = |side: [f64; 2]| side[0].max(side[1]) < -rounding * self.rim;
+            !beyond(ends.map(|p| from.perp(&p))) && !beyond(ends.map(|p| p.perp(to)))
+        };
+        let reaches = square_distance(&Vector2::zeros(), ends) < (self.rim + radius).powi(2);
+        self.ends.iter().any(|arc| arc.iter().any(is_near) || (reaches && is_between(arc)))
     }
 
     /// Adds the angles where the circle crosses the border of the stadium around a segment, of those between
@@ -676,17 +647,6 @@ impl Front {
         let left = whole.iter().flat_map(|&[a, b]| [[a, b.min(from)], [a.max(to), b]]);
         self.standing = left.filter(|[a, b]| b - a > ROUNDING).collect();
     }
-}
-
-/// Middles of the parts of a half circle of radius 1, from the right to the left.
-fn part_middles() -> impl Iterator<Item = Vector2> {
-    static MIDDLES: LazyLock<[Vector2; PARTS]> = LazyLock::new(|| {
-        std::array::from_fn(|k| {
-            let (sin, cos) = ((k as f64 + 0.5) * PART - FRAC_PI_2).sin_cos();
-            Vector2::new(cos, sin)
-        })
-    });
-    MIDDLES.iter().copied()
 }
 
 /// Square of the distance of a point from a segment.

@@ -215,6 +215,47 @@ proptest! {
     }
 }
 
+/// Small loops along a slot that is little wider than the cutter, and once more below: short lists of
+/// segments, bundles, and what is left out change no angle and no bound.
+#[test]
+fn short_lists_change_no_angle() {
+    let turn = |k: u32| (0.08 * f64::from(k), 0.2 * RADIUS);
+    let at = |k: u32| {
+        let (a, rho) = turn(k);
+        (0.004 * f64::from(k) + rho * a.cos(), rho * a.sin())
+    };
+    let mut places: Vec<(f64, f64)> = vec![(-1.0, 0.0)];
+    places.extend((0..2600).map(at));
+    let mut path = through(&places);
+    let deeper = path.moves.clone().into_iter().map(|mut step| {
+        step.to.tip.z = -4.0;
+        step
+    });
+    let deeper: Vec<Move> = deeper.collect();
+    path.moves.extend(deeper);
+    for film in [UNCOUNTED_LAYER, THIN_LAYER] {
+        let found = arcs_beyond(film, &Stock::Box(block()), &path);
+        let all = Swept::by(&path, RADIUS, film);
+        let mut thinned = Swept::by(&path, RADIUS, film);
+        let mut cut = 0;
+        for k in (1..path.len()).filter(|k| k % 37 == 0 || *k == 2603) {
+            let row = all.rows(k..k + 1, |k| all.heading(&path, 0.0, k).is_some()).remove(0);
+            let near = Bundle { around: None, segments: all.near_row(&row) };
+            let last = all.stretches(&path, 0.0, k).remove(0);
+            let exact = all.at(&last, last.half, from_ref(&near));
+            assert!((found.of_moves[k] - exact).abs() < 1e-9 || found.of_moves[k] > exact, "{k}");
+            thinned.thin(k);
+            let few = thinned.deciding_for(&row);
+            assert!((thinned.at(&last, last.half, &few) - exact).abs() < 1e-9, "{k}");
+            let most = [all.standing(&last, from_ref(&near)), thinned.deciding(&last, &few).0];
+            assert!((most[0] - most[1]).abs() < 1e-9, "{k}: {most:?}");
+            cut += usize::from(exact > 0.1);
+        }
+        let left: usize = thinned.buckets.iter().map(Vec::len).sum();
+        assert!(cut > 30 && left < 4_000, "{cut} {left}");
+    }
+}
+
 /// A way into ground that was cleared before, and beside it: as closed forms say, and as brute force over the
 /// circumference, films included, in a region with corners and an island; below its floor nothing was
 /// cleared.

@@ -55,8 +55,9 @@ use crate::surface::feed::check as feed_check;
 use crate::vocabulary::{Kept, Passes, PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
 use geometry::{Aabb, Piece, Point2, Point3, Region, SegmentGrid};
+use machine::machining_time;
 use motion::ROUNDING;
-use work::monitor::{self, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
@@ -146,6 +147,8 @@ pub fn plan_pocket(
         ground,
         bounding: bounded::Bounding::default(),
         planned,
+        settings,
+        depth: pocket.depth,
         monitor,
     };
     let (mut clearing, groups) = planner.clear(&rough)?;
@@ -203,7 +206,22 @@ struct Planner<'a> {
     /// What kept the engagement to the limit.
     bounding: bounded::Bounding,
     planned: Passes,
+    settings: &'a PlanSettings,
+    /// Depth of the floor, mm.
+    depth: f64,
     monitor: &'a dyn Monitor,
+}
+
+/// Runs of a piece, and what is to be told of them.
+struct Planned {
+    runs: Vec<Run>,
+    note: Option<String>,
+}
+
+impl From<Vec<Run>> for Planned {
+    fn from(runs: Vec<Run>) -> Self {
+        Self { runs, note: None }
+    }
 }
 
 impl Planner<'_> {
@@ -234,21 +252,49 @@ impl Planner<'_> {
         // Passes under which the bottom is level for half an interval leave no ridges.
         let ridges = self.rules.is_none() && flat < HALF_STEP * interval;
         let step = if ridges { ridges::INTERVAL_SHARE * interval } else { interval };
-        let mut runs = piece_runs(piece, cutter, strategy, step, helix, &mut self.planned, monitor)?;
+        let plans = piece_runs(piece, cutter, strategy, step, helix, &mut self.planned, monitor)?;
         // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from
         // elsewhere.
-        if self.rules.is_some() {
-            return Ok(runs);
+        let finished = |mut runs: Vec<Run>| -> Result<Vec<Run>, PlanError> {
+            if self.rules.is_some() {
+                return Ok(runs);
+            }
+            if ridges {
+                ridges::cut(piece, &mut runs, 0.5 * interval, monitor)?;
+            } else {
+                // Passes far from each other may leave something at sharp turns of inner ones.
+                runs.extend(rest::runs_to_rest(piece, &runs, flat, monitor)?);
+            }
+            let Some(air) = &self.air else { return Ok(runs) };
+            let room = walls::Room::new(piece);
+            Ok(runs.into_iter().map(|run| air.entered(run, &room)).collect())
+        };
+        let single = plans.len() == 1;
+        let mut best: Option<(f64, Planned)> = None;
+        for plan in plans {
+            let plan = Planned { runs: finished(plan.runs)?, ..plan };
+            let time = if single { 0.0 } else { self.time(&plan.runs)? };
+            if best.as_ref().is_none_or(|best| time < best.0) {
+                best = Some((time, plan));
+            }
         }
-        if ridges {
-            ridges::cut(piece, &mut runs, 0.5 * interval, monitor)?;
-        } else {
-            // Passes far from each other may leave something at sharp turns of inner ones.
-            runs.extend(rest::runs_to_rest(piece, &runs, flat, monitor)?);
+        let Some((_, Planned { runs, note })) = best else { return Ok(Vec::new()) };
+        self.planned.notes.extend(note);
+        Ok(runs)
+    }
+
+    /// Machining time of runs, about as they will be cut, s.
+    fn time(&self, runs: &[Run]) -> Result<f64, Cancelled> {
+        let (settings, radius) = (self.settings, self.cutter.radius());
+        let mut clearing = self.trimmed(runs.to_vec());
+        let chords = CHORDS_SHARE * settings.chord_tolerance;
+        for run in &mut clearing {
+            let (longest, turn) = (MOVE_OVER_RADIUS * radius, std::f64::consts::PI);
+            run.points = descend::shortened(&run.points, chords, longest, turn, |_, _| true);
         }
-        let Some(air) = &self.air else { return Ok(runs) };
-        let room = walls::Room::new(piece);
-        Ok(runs.into_iter().map(|run| air.entered(run, &room)).collect())
+        let runs = descend::Runs { clearing, along_walls: Vec::new() };
+        let path = descend::program(&runs, [self.depth, radius], self.strategy, settings);
+        machining_time(&path, &settings.machine, self.monitor)
     }
 
     /// All runs, within the room that their pieces have and the engagement that is asked for.
@@ -289,6 +335,7 @@ fn tell_bounding(bounded::Bounding { loops, above }: &bounded::Bounding, notes: 
     }
 }
 
+/// The runs of a piece, of flows by each of their smoothing lengths where none is asked for.
 fn piece_runs(
     piece: &Piece,
     cutter: &Cutter,
@@ -297,7 +344,7 @@ fn piece_runs(
     helix: bool,
     planned: &mut Passes,
     monitor: &dyn Monitor,
-) -> Result<Vec<Run>, PlanError> {
+) -> Result<Vec<Planned>, PlanError> {
     let failed = |e: NestError| match e {
         NestError::Cancelled(c) => PlanError::Cancelled(c),
         e => PlanError::NotApplicable { strategy: strategy.definition().word, reason: e.to_string() },
@@ -312,21 +359,36 @@ fn piece_runs(
         Some(turning) => nest::Spacing::bounded(step, reach, turning),
         None => nest::Spacing::lenient(step, reach),
     };
-    let (nest, spiral) = match &strategy.pattern {
-        Pattern::Streamline(vectors) => return stream::runs(piece, vectors, cutter, step, planned, monitor),
+    let (nests, spiral) = match &strategy.pattern {
+        Pattern::Streamline(vectors) => {
+            return Ok(vec![stream::runs(piece, vectors, cutter, step, planned, monitor)?.into()]);
+        }
         Pattern::Zigzag { angle } => {
             let step = turning.map_or(step, |turning| step.min(turning.step(0.0)));
-            return Ok(lines::runs(piece, *angle, step));
+            return Ok(vec![lines::runs(piece, *angle, step).into()]);
         }
-        Pattern::Offset { spiral } => (nest::offsets(piece, &spacing, monitor).map_err(failed)?, *spiral),
+        Pattern::Offset { spiral } => {
+            (vec![(nest::offsets(piece, &spacing, monitor).map_err(failed)?, None)], *spiral)
+        }
         Pattern::Flow(flow) => {
-            let (nest, sigma) = nest::flow(piece, flow, spacing, reach, monitor).map_err(failed)?;
+            let mut nests = nest::flows(piece, flow, spacing, reach, monitor).map_err(failed)?;
+            if turning.is_some() {
+                // What loops add is known only once all is planned.
+                nests.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
+                nests.truncate(1);
+            }
             let plain = nest::offsets(piece, &spacing, monitor).map_err(failed)?.length();
-            planned.notes.push(format!(
-                "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
-                nest.length()
-            ));
-            (nest, flow.spiral)
+            let note = |nest: &nest::Nest, sigma: f64| {
+                format!(
+                    "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
+                    nest.length()
+                )
+            };
+            let noted = |(nest, sigma)| {
+                let note = note(&nest, sigma);
+                (nest, Some(note))
+            };
+            (nests.into_iter().map(noted).collect(), flow.spiral)
         }
     };
     let walls = SegmentGrid::of_curves(piece.curves());
@@ -335,5 +397,6 @@ fn piece_runs(
     // A way from outside needs none.
     let helix = [wanted, if helix { least } else { f64::INFINITY }];
     let settings = route::RouteSettings { helix, spiral, spacing: SPACING * step, leads };
-    Ok(route::runs(&nest, &walls, &settings))
+    let planned = |(nest, note)| Planned { runs: route::runs(&nest, &walls, &settings), note };
+    Ok(nests.into_iter().map(planned).collect())
 }

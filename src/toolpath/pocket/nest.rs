@@ -476,30 +476,22 @@ pub fn thinned(curve: &[Point2], tolerance: f64) -> Vec<Point2> {
     if points.len() < 3 { curve.to_vec() } else { points }
 }
 
-/// The nest of a flow: of a given smoothing length, or of that with the shortest passes.
+/// The nests of a flow, each with its smoothing length, mm: of a given one, or of four.
 ///
 /// # Errors
 /// [`NestError`].
-pub fn flow(
+pub fn flows(
     piece: &Piece,
     flow: &Flow,
     spacing: Spacing,
     reach: f64,
     monitor: &dyn Monitor,
-) -> Result<(Nest, f64), NestError> {
+) -> Result<Vec<(Nest, f64)>, NestError> {
     /// Smoothing lengths that are tried, over the radius of the largest disc.
     const SHARES: [f64; 4] = [0.08, 0.16, 0.32, 0.64];
     let field = FlowField::new(piece, spacing.step, monitor)?;
-    if let Some(sigma) = flow.smoothing {
-        return Ok((field.nest(piece, sigma, spacing, reach, monitor)?, sigma));
-    }
-    let mut best: Option<(f64, Nest, f64)> = None;
-    for sigma in SHARES.map(|share| share * field.deepest()) {
-        let nest = field.nest(piece, sigma, spacing, reach, monitor)?;
-        let length = nest.length();
-        if best.as_ref().is_none_or(|b| length < b.0) {
-            best = Some((length, nest, sigma));
-        }
-    }
-    best.map(|(_, nest, sigma)| (nest, sigma)).ok_or(NestError::Flow(PlanarError::Triangulation))
+    let lengths = flow
+        .smoothing
+        .map_or_else(|| SHARES.map(|share| share * field.deepest()).to_vec(), |sigma| vec![sigma]);
+    lengths.into_iter().map(|sigma| Ok((field.nest(piece, sigma, spacing, reach, monitor)?, sigma))).collect()
 }

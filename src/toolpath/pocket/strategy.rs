@@ -21,8 +21,8 @@ use motion::ROUNDING;
 /// How a flow is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flow {
-    /// Length over which the distance from the walls is smoothed, mm; `None`: that of four with the
-    /// shortest passes.
+    /// Length over which the distance from the walls is smoothed, mm; `None`: that of four whose path is the
+    /// quickest, or which has the shortest passes where the engagement is bounded.
     pub smoothing: Option<f64>,
     /// One spiral where passes are nested around one place.
     pub spiral: bool,

@@ -13,7 +13,7 @@ use super::nest::{NestError, planar_mesh};
 use super::route::{Entry, Run, begun_near};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
-use crate::levels::spacing::place_levels;
+use crate::levels::spacing::{AllowedStep, place_levels};
 use crate::levels::{obedience, planned_field};
 use crate::surface::asked::{self, Ground};
 use crate::surface::feed;
@@ -30,6 +30,9 @@ const EDGE_OVER_STEP: f64 = 0.2;
 
 /// Points of passes over the stepover.
 const SAMPLING: f64 = 0.1;
+
+/// A pass serves what is so near to it, over the stepover.
+const SERVED: f64 = 0.5;
 
 /// Singular points nearer than this many radii of the cutter count as one.
 const MERGE_OVER_RADIUS: f64 = 1.0;
@@ -85,6 +88,19 @@ pub fn runs(
         let ending = Vectors { along_walls: false, ..vectors.clone() };
         return runs(piece, &ending, cutter, step, planned, monitor);
     }
+    // Traced lines follow the narrowest strip. Where the gradient of ψ vanishes no strip is narrow enough: a
+    // line beside such a place serves what is within half an interval, and further passes serve the rest.
+    let level_at = match vectors.lines {
+        Lines::RungeKutta => singular_points(mesh, &source.on.level_lines(), SERVED * step),
+        Lines::Levels => Vec::new(),
+    };
+    let is_served = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+        level_at.iter().any(|point| (point.position - middle).norm() < SERVED * step)
+    };
+    let places: Vec<AllowedStep> =
+        places.into_iter().enumerate().filter(|(t, _)| !is_served(*t)).map(|(_, place)| place).collect();
     let placed = place_levels(&places, range, vectors.lines.steps(), &mut planned.notes);
     let mut passes = along_and_between(&source, &placed, range, SAMPLING * step, monitor)?;
     // Parameters of a pocket are x and y.

@@ -397,8 +397,6 @@ fn directions_across_do_not_run_along_walls() {
     assert!(planned(FeedDirection::Border(Sense::Along), true).is_ok());
 }
 
-/// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and
-/// streamlines traced by Runge and Kutta's method stay on them within the chord tolerance.
 /// No function with one value along the wall follows both sides of a slot. Passes then end at walls, which a
 /// note tells, and clear it.
 #[test]
@@ -426,6 +424,8 @@ fn streamlines_of_a_slot_end_at_its_walls() {
     }
 }
 
+/// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and
+/// streamlines traced by Runge and Kutta's method stay on them within the chord tolerance.
 #[test]
 fn streamlines_around_an_island_are_the_traced_ones() {
     let pocket = pocket(vec![disc(0.0, 0.0, 30.0), disc(0.0, 0.0, 6.0)]);
@@ -484,4 +484,21 @@ fn traced_lines_fill_a_pocket() {
         println!("{:?}: passes and share too far apart {levels:?} {traced:?}", vectors.direction);
         assert!(traced.0 > 5 && traced.1 <= levels.1 + 0.01, "{traced:?} {levels:?}");
     }
+}
+
+/// Beside an island off the middle the function of the walls has saddles, where no interval is narrow enough:
+/// traced lines do not crowd for that.
+#[test]
+fn traced_lines_do_not_crowd_at_saddles() {
+    let around = pocket(vec![rectangle(0.0, 0.0, 65.0, 40.0), rectangle(20.0, 14.0, 32.0, 24.0)]);
+    let length = |lines: Lines| {
+        let direction = FeedDirection::Border(Sense::Along);
+        let vectors = Vectors { direction, direction_weight: 0.3, along_walls: true, lines };
+        let strategy = strategy(Pattern::Streamline(vectors));
+        let settings = PlanSettings { step: Step::Stepover(3.0), ..settings() };
+        let plan = plan_pocket(&around, &Cutter::flat(8.0).unwrap(), &strategy, &settings, &Silent).unwrap();
+        plan.path.segments().filter(|(.., m)| m.kind == MoveKind::Cut).map(|(a, b, _)| (b - a).norm()).sum()
+    };
+    let [levels, traced]: [f64; 2] = [Lines::Levels, Lines::RungeKutta].map(length);
+    assert!(traced < 1.6 * levels, "{traced} {levels}");
 }

@@ -63,3 +63,23 @@ fn no_place_is_farther_than_half_an_interval() {
         }
     }
 }
+
+/// Of the smoothing lengths of a flow the quickest is taken, ways over ridges and entries included, and not the
+/// one with the shortest curves.
+#[test]
+fn the_quickest_flow_is_taken() {
+    let corners = [(0.0, 0.0), (35.0, 0.0), (35.0, 11.0), (17.0, 11.0), (17.0, 25.0), (0.0, 25.0)];
+    let around = pocket(vec![corners.map(|(x, y)| Point2::new(x, y)).to_vec()]);
+    let (cutter, settings) =
+        (Cutter::ball(4.0).unwrap(), PlanSettings { step: Step::Stepover(0.3), ..settings() });
+    let time = |smoothing: Option<f64>| {
+        let strategy = strategy(Pattern::Flow(Flow { smoothing, spiral: true }));
+        let plan = plan_pocket(&around, &cutter, &strategy, &settings, &Silent).unwrap();
+        machine::machining_time(&plan.path, &settings.machine, &Silent).unwrap()
+    };
+    let deepest = around.region.inset(2.0).largest_disc(0.01, &Silent).unwrap().unwrap().1;
+    let each = [0.08, 0.16, 0.32, 0.64].map(|share| time(Some(share * deepest)));
+    let least = each.into_iter().fold(f64::INFINITY, f64::min);
+    let taken = time(None);
+    assert!(taken <= 1.02 * least, "{taken} of {each:?}");
+}
