@@ -243,7 +243,8 @@ impl Session {
         let (limits, rule) = (&scene.tolerance, &scene.scallop_rule);
         let claims = judge::judge(measurement, limits, rule, of_figures, path.program_name());
         let mut claims = judge::each_violation_once(claims);
-        judge::name_strays(&mut claims, path.origin.strays);
+        let rounded = run.request.foreign().map_or(0.0, |read| read.rounded);
+        judge::name_strays(&mut claims, path.origin.strays, rounded);
         if let Some(read) = run.request.foreign() {
             claims = figures::with_lengths_open(claims, &read.findings);
         }

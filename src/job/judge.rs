@@ -83,15 +83,24 @@ pub(crate) const UNSEEN: &str = ", measured along normals where no cell sees";
 const STRAYS: &str = "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine], or shorter moves where axes \
                       turn, would decide it";
 
+/// The same of a program from elsewhere.
+const ROUNDED: &str = "the program lets the control round corners by as much (G64 P, G187 E): a lesser tolerance, or G61, would decide it";
+
 /// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves
-/// that are measured.
-pub(crate) fn name_strays(claims: &mut [Claim], strays: f64) {
-    let hangs_on_it = |claim: &Claim| {
-        let nearer = Claim { error_bound: claim.error_bound - strays, ..claim.clone() };
-        claim.unit == "mm" && claim.verdict() == Verdict::Undecided && nearer.verdict() != Verdict::Undecided
+/// that are measured; `rounded` of that, mm, is what a program from elsewhere lets the control round corners
+/// by.
+pub(crate) fn name_strays(claims: &mut [Claim], strays: f64, rounded: f64) {
+    let hangs_on = |claim: &Claim, by: f64| {
+        let nearer = Claim { error_bound: claim.error_bound - by, ..claim.clone() };
+        by > 0.0 && nearer.verdict() != Verdict::Undecided
     };
-    for claim in claims.iter_mut().filter(|claim| strays > 0.0 && hangs_on_it(claim)) {
-        claim.decided_by = STRAYS;
+    for claim in claims.iter_mut().filter(|claim| claim.unit == "mm" && claim.verdict() == Verdict::Undecided)
+    {
+        if hangs_on(claim, rounded) {
+            claim.decided_by = ROUNDED;
+        } else if hangs_on(claim, strays) {
+            claim.decided_by = STRAYS;
+        }
     }
 }
 
