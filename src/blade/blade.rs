@@ -13,6 +13,7 @@ use super::loft;
 use super::sections::{SectionError, SectionSides, Sections};
 use crate::fairing::{Faired, Fairing, FairingError, FairingMethod, outlier};
 use crate::loft::{Loft, LoftError, LoftSection};
+use crate::neighbours::{Overlap, overlap};
 use crate::{loft_as_published, loft_of_offsets};
 use geometry::{CubicSpline, Isometry3, NurbsSurface, Point2, SplineError, Vector2, Vector3};
 
@@ -90,9 +91,36 @@ pub enum BladeError {
          round the edge in the section table"
     )]
     SharpEdge,
+    /// The second blade stands in the first one.
+    #[error(
+        "at height {height} mm the blades run into each other near x {:.3} y {:.3} of the table (the second one is {:.3} {:.3} \
+         {:.3} mm from the first)",
+        at.x, at.y, pitch.x, pitch.y, pitch.z
+    )]
+    Neighbours {
+        /// In the table, mm.
+        height: f64,
+        /// x and y in the table, mm.
+        at: Point2,
+        /// From one blade to the other, mm.
+        pitch: Vector3,
+    },
     /// Two blades were asked for as one passage, and there is one.
     #[error("a passage lies between two blades: say where the second one stands (`pitch`)")]
     NoSecondBlade,
+}
+
+impl BladeError {
+    /// How to mend it, where that is not in the section table.
+    pub fn cure(&self) -> Option<&'static str> {
+        match self {
+            Self::Neighbours { .. } => Some("write a longer `pitch`, or thinner sections"),
+            Self::Fairing { source: FairingError::TooFewPoints { .. }, .. } => {
+                Some("write fewer `neighbours`, or more points of that section")
+            }
+            _ => None,
+        }
+    }
 }
 
 /// A curve of each section.
@@ -193,7 +221,13 @@ impl Blade {
     /// See [`BladeError`].
     pub fn new(sections: &Sections, settings: &BladeSettings) -> Result<Self, BladeError> {
         let mut laid = Vec::new();
-        let curves = curves(sections, settings, &mut laid)?;
+        let sides = sections.sides()?;
+        if let Some(pitch) = settings.pitch
+            && let Some(Overlap { height, at, .. }) = overlap(&sides, &pitch)
+        {
+            return Err(BladeError::Neighbours { height, at, pitch });
+        }
+        let curves = curves(&sides, settings, &mut laid)?;
         let lofts: Vec<Loft> = curves
             .iter()
             .map(|c| loft(&c.sections(), LOFT_TOLERANCE).map_err(|e| c.refused(e)))
@@ -305,11 +339,10 @@ impl Blade {
 
 /// The curves that the asked surfaces are laid through.
 fn curves(
-    sections: &Sections,
+    sides: &[SectionSides],
     settings: &BladeSettings,
     laid: &mut Vec<BladeSection>,
 ) -> Result<Vec<Curves>, BladeError> {
-    let sides = sections.sides()?;
     let wanted: &[BladeCurve] = match settings.side {
         BladeSide::Both | BladeSide::Passage => &[BladeCurve::Pressure, BladeCurve::Suction],
         BladeSide::Pressure => &[BladeCurve::Pressure],

@@ -10,6 +10,7 @@
 mod blade;
 mod fairing;
 mod loft;
+mod neighbours;
 pub mod sections;
 
 pub use blade::{Blade, BladeCurve, BladeError, BladeSection, BladeSettings, BladeSide};

@@ -182,6 +182,11 @@ fn of_table(file: &Path, options: &VerifyOptions) -> Result<Chosen, CliError> {
     let meant = match (&tools[..], &feeding[..]) {
         ([only], _) => Some(only),
         (_, [number]) => table.get(*number),
+        (_, []) => {
+            let what = format!("{} cuts nothing: no tool moves at feed", shown(&options.program));
+            let cure = "name a program with motion such as G1 X10 F100";
+            return Err(refused(&what, cure));
+        }
         _ => None,
     };
     meant

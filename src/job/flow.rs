@@ -249,7 +249,8 @@ impl Session {
             (None, Some(_)) => lesser_arcs,
             (None, None) => lesser_chord,
         };
-        judge::name_strays(&mut claims, path.origin.strays, less);
+        let rounded = run.request.foreign().map_or(0.0, |read| read.rounded);
+        judge::name_strays(&mut claims, (path.origin.strays, less), rounded);
         if let Some(read) = run.request.foreign() {
             claims = figures::with_lengths_open(claims, &read.findings);
         }

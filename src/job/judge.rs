@@ -87,15 +87,24 @@ pub(crate) const LESS_STRAYING: [&str; 3] = [
      decide it",
 ];
 
+/// The same of programs that let the control round corners.
+const ROUNDED: &str = "the program lets the control round corners by as much (G64 P, G187 E): a lesser tolerance, or G61, would decide it";
+
 /// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves
-/// that are measured; and which of [`LESS_STRAYING`] would decide them.
-pub(crate) fn name_strays(claims: &mut [Claim], strays: f64, less: &'static str) {
-    let hangs_on_it = |claim: &Claim| {
-        let nearer = Claim { error_bound: claim.error_bound - strays, ..claim.clone() };
-        claim.unit == "mm" && claim.verdict() == Verdict::Undecided && nearer.verdict() != Verdict::Undecided
+/// that are measured, for the reason that goes with it; `rounded` of that, mm, is what a program from elsewhere
+/// lets the control round corners by.
+pub(crate) fn name_strays(claims: &mut [Claim], (strays, less): (f64, &'static str), rounded: f64) {
+    let hangs_on = |claim: &Claim, by: f64| {
+        let nearer = Claim { error_bound: claim.error_bound - by, ..claim.clone() };
+        by > 0.0 && nearer.verdict() != Verdict::Undecided
     };
-    for claim in claims.iter_mut().filter(|claim| strays > 0.0 && hangs_on_it(claim)) {
-        claim.decided_by = less;
+    for claim in claims.iter_mut().filter(|claim| claim.unit == "mm" && claim.verdict() == Verdict::Undecided)
+    {
+        if hangs_on(claim, rounded) {
+            claim.decided_by = ROUNDED;
+        } else if hangs_on(claim, strays) {
+            claim.decided_by = less;
+        }
     }
 }
 

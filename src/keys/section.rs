@@ -47,15 +47,19 @@ fn in_few_digits(value: f64) -> String {
     if is_long && value.is_finite() { format!("{value:e}") } else { value.to_string() }
 }
 
-/// `a number in mm (1e-6 to 10000)`.
-fn number_in(range: &RangeInclusive<f64>, unit: &str) -> String {
+/// `a number in mm (1e-6 to 10000)`; a unit in brackets says what it is, and stands behind the range.
+fn number_in(noun: &str, range: &RangeInclusive<f64>, unit: &str) -> String {
     // Digits that can be counted at a glance, or an exponent.
     let shown = |x: f64| {
         let long = x != 0.0 && !(1e-3..1e7).contains(&x.abs());
         if long { format!("{x:e}") } else { x.to_string() }
     };
-    let unit = if unit.is_empty() { String::new() } else { format!(" in{unit}") };
-    format!("a number{unit} ({} to {})", shown(*range.start()), shown(*range.end()))
+    let limits = format!("{} to {}", shown(*range.start()), shown(*range.end()));
+    match unit.trim_start().strip_prefix('(').and_then(|what| what.strip_suffix(')')) {
+        Some(what) => format!("{noun} ({limits}, {what})"),
+        None if unit.is_empty() => format!("{noun} ({limits})"),
+        None => format!("{noun} in{unit} ({limits})"),
+    }
 }
 
 fn as_number(value: &DeValue<'_>) -> Option<f64> {
@@ -285,7 +289,7 @@ impl<'a> Section<'a> {
         unit: &str,
     ) -> Result<Option<Located<f64>>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
-        self.in_range(key, entry, &range, unit).map(Some)
+        self.in_range(key, entry, &range, ["a number", unit]).map(Some)
     }
 
     /// As [`Self::number`], with a value for where the key is not there.
@@ -304,9 +308,9 @@ impl<'a> Section<'a> {
         key: &str,
         entry: &Spanned<DeValue<'a>>,
         range: &RangeInclusive<f64>,
-        unit: &str,
+        [noun, unit]: [&str; 2],
     ) -> Result<Located<f64>, SceneError> {
-        let expected = number_in(range, unit);
+        let expected = number_in(noun, range, unit);
         let Some(value) = as_number(entry.get_ref()) else {
             return Err(self.wrong_type(key, &expected, entry, "write digits without quotes or unit"));
         };
@@ -348,7 +352,7 @@ impl<'a> Section<'a> {
                 format!("write `[0.4, 0.2]`{}", if unit.is_empty() { "" } else { ", without the unit" });
             return Err(self.wrong_type(key, "a list of numbers", entry, &cure));
         };
-        list.iter().map(|item| Ok(self.in_range(key, item, range, unit)?.value)).collect()
+        list.iter().map(|item| Ok(self.in_range(key, item, range, ["a number", unit])?.value)).collect()
     }
 
     /// A positive length, mm, that must be there.
@@ -370,7 +374,8 @@ impl<'a> Section<'a> {
     /// A whole number within `range`.
     pub fn count(&self, key: &str, range: RangeInclusive<u32>) -> Result<Option<u32>, SceneError> {
         let limits = f64::from(*range.start())..=f64::from(*range.end());
-        let Some(number) = self.number(key, limits, "")? else { return Ok(None) };
+        let Some(entry) = self.entry(key) else { return Ok(None) };
+        let number = self.in_range(key, entry, &limits, ["a whole number", ""])?;
         if number.value.fract() != 0.0 {
             let message = format!("`{key}` in {} is {}; expected a whole number", self.title, number.value);
             return Err(self.error(&number.span, message, format!("write {}", number.value.round())));
@@ -398,7 +403,7 @@ impl<'a> Section<'a> {
         };
         let numbers: Vec<f64> = list
             .iter()
-            .map(|item| Ok(self.in_range(key, item, &range, unit)?.value))
+            .map(|item| Ok(self.in_range(key, item, &range, ["a number", unit])?.value))
             .collect::<Result<_, _>>()?;
         match numbers[..] {
             [from, to] if from < to => Ok(Some([from, to])),
@@ -477,7 +482,7 @@ impl<'a> Section<'a> {
         let DeValue::Array(numbers) = item.get_ref() else { return Err(wrong()) };
         let row: Vec<f64> = numbers
             .iter()
-            .map(|number| Ok(self.in_range(key, number, &COORDINATE, "")?.value))
+            .map(|number| Ok(self.in_range(key, number, &COORDINATE, ["a number", ""])?.value))
             .collect::<Result<_, SceneError>>()?;
         <[f64; N]>::try_from(row).map_err(|_| wrong())
     }

@@ -166,6 +166,17 @@ impl GougeFigures {
         Self { max_depth_mm: max_mm, error_bound_mm, at_least_mm, ..self.clone() }
     }
 
+    /// The deepest cut, mm, its place and its move: those of the deepest region, or, where none is listed
+    /// because no place of the grid or net is so deep, of one without an area.
+    pub(crate) fn deepest_at(&mut self, depth: f64, at: [f64; 3], by: u32) {
+        if self.regions.is_empty() {
+            self.regions.push(GougeRegion::default());
+            self.region_count = 1;
+        }
+        let first = &mut self.regions[0];
+        (first.depth_mm, first.at_mm, first.move_index) = (depth, at, by);
+    }
+
     /// A deeper cut was found, mm.
     pub(crate) fn raise_to(&mut self, depth: f64) {
         let possible = self.max_depth_mm + self.error_bound_mm;

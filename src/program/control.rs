@@ -165,6 +165,8 @@ pub enum Code {
     ExactStop(bool),
     /// G61 of LinuxCNC: it comes to rest at corners alone.
     ExactPath,
+    /// G187 of Haas: how far it rounds corners.
+    Smoothness,
     /// Others that move nothing by themselves.
     Quiet,
     /// Known, and beyond verification.
@@ -180,7 +182,28 @@ impl Code {
             _ => false,
         }
     }
+
+    /// The modal group that it belongs to, as ISO 6983 and LinuxCNC number them: a block has one code of each.
+    /// Motions, and codes that take words of their block, are held apart by what they take.
+    pub(crate) fn group(self) -> Option<usize> {
+        match self {
+            Self::Plane(_) => Some(2),
+            Self::Absolute(_) => Some(3),
+            Self::ArcAbsolute(_) => Some(4),
+            Self::Feed(_) => Some(5),
+            Self::Units { .. } => Some(6),
+            Self::Radius(_) => Some(7),
+            Self::Length(_) => Some(8),
+            Self::Retract { .. } => Some(10),
+            Self::Work(_) | Self::MoreWork => Some(12),
+            Self::ExactStop(_) | Self::ExactPath => Some(13),
+            _ => None,
+        }
+    }
 }
+
+/// One more than the greatest [`Code::group`].
+pub(crate) const GROUPS: usize = 14;
 
 /// On which side of the contour the cutter runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -288,6 +311,10 @@ pub struct Control {
     /// Under which setting rapid moves run straight, in a clause, where they may lead each axis at its own
     /// rate; `None` where they run straight on all of them.
     pub straight_rapids: Option<&'static str>,
+    /// What bounds how far it rounds corners, in words; `None` where it goes through all of them.
+    pub corners_bounded_by: Option<&'static str>,
+    /// Whether it is known to round corners without a bound until the program says otherwise.
+    pub rounds_at_start: bool,
     /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as
     /// well.
     pub arc_tolerance: f64,
@@ -408,7 +435,7 @@ const COMMON: &[(u16, Code)] = &[
 /// in ISO mode together.
 pub const GENERAL: Control = Control {
     word: "general",
-    codes: &[(51, QUIET), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
+    codes: &[(51, QUIET), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, Some(Code::Smoothness))],
     one_shift: false,
     peck_clearance: 0.25,
     cycles_by_level: false,
@@ -428,6 +455,8 @@ pub const GENERAL: Control = Control {
     dwell_in_ms: true,
     tcp_switch: None,
     straight_rapids: None,
+    corners_bounded_by: Some("G64 P, G187 E or G61"),
+    rounds_at_start: false,
     arc_tolerance: 0.01,
 };
 
@@ -470,6 +499,8 @@ pub const LINUXCNC: Control = Control {
     dwell_in_ms: false,
     tcp_switch: Some([4280, 4290]),
     straight_rapids: None,
+    corners_bounded_by: Some("G64 P or G61"),
+    rounds_at_start: true,
     arc_tolerance: 0.001_27,
 };
 
@@ -496,6 +527,7 @@ pub const FANUC: Control = Control {
     },
     may_count_increments: true,
     repeats_in_p: true,
+    corners_bounded_by: Some("G61 or G9"),
     straight_rapids: Some("On a Fanuc control they do so with parameter 1401 bit 1 (LRP) = 1"),
     ..GENERAL
 };
@@ -503,10 +535,11 @@ pub const FANUC: Control = Control {
 /// Haas mills.
 pub const HAAS: Control = Control {
     word: "haas",
-    codes: &[(431, None), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
+    codes: &[(431, None), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, Some(Code::Smoothness))],
     cycle_repeats: (b"L", 0),
     variables: Variables { free: &[(1, 999), (10_000, 10_999)], ..FANUC.variables },
     repeats_in_p: false,
+    corners_bounded_by: Some("G187 E or G61"),
     straight_rapids: Some("On a Haas control they do so with setting 335 (linear rapid mode)"),
     ..FANUC
 };
@@ -536,6 +569,7 @@ pub const GRBL: Control = Control {
     ],
     axis_words_once: true,
     dwell_takes_x: false,
+    corners_bounded_by: None,
     arc_tolerance: 0.005,
     dwell_in_ms: false,
     ..GENERAL
@@ -547,6 +581,7 @@ pub const MACH: Control = Control {
     dwell_in_ms: false,
     cycle_repeats: (b"L", 0),
     dwell_takes_x: false,
+    corners_bounded_by: Some("G61"),
     logic: Logic::Truth,
     ..GENERAL
 };

@@ -283,3 +283,65 @@ fn places_beyond_every_machine_are_refused_with_offsets_in_them() {
         }
     }
 }
+
+/// How far each run is off its corners by the leave of the program, mm, and the line behind the first corner
+/// that nothing bounds.
+fn rounded(text: &str, control: &'static Control) -> (f64, Option<u32>) {
+    let placing = Placing { chord: 0.1, kinematics: None, lengths: &|_| None };
+    let run = read(text, control).runs(&placing).unwrap().swap_remove(0);
+    assert_eq!(run.path.origin.strays, run.rounded, "{text}");
+    (run.rounded, run.rounded_freely)
+}
+
+#[test]
+fn a_tolerance_of_corners_is_how_far_the_motion_strays() {
+    let corner = |codes: &str| format!("{codes}\nG0 X1\nG1 Y1 F9\nX2\nM30\n");
+    let mach = Control::from_word("mach").unwrap();
+    for (codes, control, expected) in [
+        // What is off a line by Q is left out, and corners are rounded by P; P stands for both.
+        ("G64 P1", &LINUXCNC, (2.0, None)),
+        ("G64 P0.5 Q0.25", &LINUXCNC, (0.75, None)),
+        ("G20 G64 P0.1", &LINUXCNC, (5.08, None)),
+        ("G64 P0.1 G20", GENERAL, (5.08, None)),
+        ("G64 P1\nG61", &LINUXCNC, (0.0, None)),
+        ("G64 P1\nG61.1", &LINUXCNC, (0.0, None)),
+        ("G64 P1\nG64", &LINUXCNC, (0.0, Some(3))),
+        ("G64 P0", &LINUXCNC, (0.0, Some(3))),
+        ("G21", &LINUXCNC, (0.0, Some(3))),
+        ("G21", &HAAS, (0.0, None)),
+        ("G64", &HAAS, (0.0, Some(3))),
+        ("G64", &FANUC, (0.0, Some(3))),
+        ("G64", mach, (0.0, Some(3))),
+        ("G64", &GRBL, (0.0, None)),
+        ("G187 P1 E0.01", &HAAS, (0.01, None)),
+        ("G187 E0.01\nG61\nG64", &HAAS, (0.01, None)),
+        ("G187 E0.01\nG61", &HAAS, (0.0, None)),
+        ("G187 E0.01\nG187", &HAAS, (0.0, Some(4))),
+    ] {
+        let lines = codes.matches('\n').count() as u32;
+        let (by, line) = rounded(&corner(codes), control);
+        assert!((by - expected.0).abs() < 1e-12, "{} {codes}: {by}", control.word);
+        assert_eq!(line, expected.1.map(|line| line.max(lines + 3)), "{} {codes}", control.word);
+    }
+    // Straight on there is no corner, nor where the machine rests.
+    assert_eq!(rounded("G64 P1\nG1 X1 F9\nX2\nG4 P1\nY2\nM30\n", &LINUXCNC), (0.0, None));
+    assert_eq!(rounded("G64 P1\nG1 X1 F9\nX0\nM30\n", &LINUXCNC), (2.0, None));
+    assert!(matches!(refused(&corner("G64 P-1"), &LINUXCNC), (1, Fault::Value { letter: 'P', .. })));
+}
+
+#[test]
+fn two_codes_of_one_modal_group_are_refused_in_one_block() {
+    for block in
+        ["G41 G40 D1", "G40 G42", "G90 G91", "G17 G18", "G20 G21", "G61 G64", "G54 G55", "M3 M4", "M5 M3"]
+    {
+        for control in [GENERAL, &LINUXCNC, &FANUC] {
+            let (line, fault) = refused(&format!("G1 X1 F1\n{block} S100\nM30\n"), control);
+            assert!(
+                line == 2 && matches!(fault, Fault::Conflict { .. }),
+                "{} {block}: {fault}",
+                control.word
+            );
+        }
+    }
+    read("G17 G21 G40 G49 G54 G64 G80 G90 G94\nM3 M8 S9\nG90 G90 G0 X1\nM30\n", &FANUC);
+}

@@ -8,7 +8,7 @@ mod offsets;
 
 use crate::block::{self, Block, CodeWord};
 use crate::compensation::Compensation;
-use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
+use crate::control::{Code, Codes, Control, FeedMode, GROUPS, Length, Motion, Plane, RadiusSide, spelled};
 use crate::error::{Fault, ProgramError, Stop};
 use crate::expression::{Scope, Value};
 use crate::flow::{Flow, Next};
@@ -80,7 +80,7 @@ pub(crate) struct Interpreter<'a> {
     pub flow: Flow,
     pub out: Program,
     /// The setting changed since the last step.
-    changed: bool,
+    pub changed: bool,
     /// The program has moved.
     moved: bool,
     /// It has fed.
@@ -107,7 +107,7 @@ pub(crate) struct Interpreter<'a> {
 
 impl<'a> Interpreter<'a> {
     pub fn new(lines: Lines<'a>, control: &'static Control, setup: &Setup) -> Self {
-        let state = State::new(setup);
+        let state = State::new(setup, control);
         let out = Program { start: state.place, lines: lines.len(), ..Program::default() };
         Self {
             lines,
@@ -326,7 +326,8 @@ impl<'a> Interpreter<'a> {
     /// The codes that set something, and what the others ask for.
     fn settings(&mut self, asked: &mut Asked) -> Result<(), Stop> {
         let words = self.block.g;
-        let mut exact_path = false;
+        let mut at_corners = None;
+        let mut groups: [Option<CodeWord>; GROUPS] = [None; GROUPS];
         for word in words.as_slice() {
             let column = usize::from(word.column);
             let Some(code) = self.codes.get(word.tenths) else {
@@ -337,6 +338,12 @@ impl<'a> Interpreter<'a> {
                 let [first, second] = [first.tenths, word.tenths].map(spelled);
                 Stop::new(column, Fault::Conflict { first, second })
             };
+            if let Some(group) = code.group() {
+                match groups[group].replace(*word) {
+                    Some(first) if first.tenths != word.tenths => return Err(conflict(first)),
+                    _ => {}
+                }
+            }
             if self.moves_frame(code) {
                 self.needs_no_compensation(*word)?;
             }
@@ -372,10 +379,17 @@ impl<'a> Interpreter<'a> {
                 Code::Machine => asked.machine = true,
                 Code::Quiet => asked.quiet = true,
                 Code::StopOnce => asked.stop = true,
-                Code::ExactStop(stop) => (modal.exact_stop, asked.quiet) = (stop, true),
+                Code::ExactStop(stop) => {
+                    (modal.exact_stop, asked.quiet) = (stop, true);
+                    at_corners = Some(code);
+                }
                 Code::ExactPath => {
                     modal.exact_stop = false;
-                    exact_path = true;
+                    at_corners = Some(code);
+                }
+                Code::Smoothness => {
+                    asked.quiet = true;
+                    at_corners = Some(code);
                 }
                 Code::Unsupported(why) => {
                     let code = spelled(word.tenths);
@@ -391,8 +405,8 @@ impl<'a> Interpreter<'a> {
                 },
             }
         }
-        if exact_path {
-            self.note("G61 is timed as G64: corners are rounded by no more than the junction deviation");
+        if let Some(code) = at_corners {
+            self.corners(code)?;
         }
         self.check_together(asked)
     }
@@ -439,7 +453,14 @@ impl<'a> Interpreter<'a> {
     /// Codes of M. Those that end the program come last.
     fn switches(&mut self) -> Result<Next, Stop> {
         let (words, mut next) = (self.block.m, Next::Line);
+        let mut of_spindle: Option<u16> = None;
         for word in words.as_slice() {
+            if matches!(word.tenths, 30 | 40 | 50)
+                && let Some(first) = of_spindle.replace(word.tenths).filter(|first| *first != word.tenths)
+            {
+                let [first, second] = [first, word.tenths].map(|tenths| format!("M{}", tenths / 10));
+                return Err(Stop::new(usize::from(word.column), Fault::Conflict { first, second }));
+            }
             match word.tenths {
                 20 | 300 => next = Next::End,
                 30 => self.turn(Spindle::Clockwise),

@@ -19,6 +19,7 @@ mod canonical_tests;
 mod checks;
 mod compensation;
 mod control;
+mod corners;
 mod cursor;
 mod cycle;
 #[cfg(test)]
@@ -43,6 +44,7 @@ pub use checks::{Finding, FindingKind};
 pub use control::{
     CONTROLS, Code, Control, Cycle, Down, FeedMode, Length, Logic, Motion, Plane, RadiusSide, Variables,
 };
+pub use corners::Corners;
 pub use error::{Fault, ProgramError};
 pub use frame::{Place, WORK_OFFSETS};
 pub use interpret::read_gcode;

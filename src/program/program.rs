@@ -1,6 +1,7 @@
 //! A program as motion: what a control makes of the text.
 
 use crate::control::Plane;
+use crate::corners::Corners;
 use crate::frame::Place;
 
 /// How a step moves.
@@ -96,6 +97,8 @@ pub struct Setting {
     pub tip_kept: bool,
     /// Work offset, from 1 for G54.
     pub work: u32,
+    /// What it does at corners.
+    pub corners: Corners,
 }
 
 /// A remark of the reader on a line.

@@ -9,6 +9,7 @@ use geometry::{Point3, Vector3};
 use machine::kinematics::{Joints, Kinematics, Pace, Side, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
+use crate::corners::Corners;
 use crate::error::{Fault, ProgramError};
 use crate::frame::{Place, fed_length};
 use crate::program::{Arc, Program, Setting, Spindle, Step, StepKind};
@@ -56,6 +57,10 @@ pub struct ToolRun {
     /// The joints that it goes through on a machine with rotary axes; none of cutter locations, and on other
     /// machines.
     pub joints: Vec<Waypoint>,
+    /// How far the control may round corners, mm, which [`motion::Origin::strays`] has as well.
+    pub rounded: f64,
+    /// The line behind the first corner that the control rounds without a bound.
+    pub rounded_freely: Option<u32>,
 }
 
 impl Program {
@@ -99,6 +104,11 @@ impl Program {
             }
             run.pace = Pace { rests: run.pace.rests || rests, goes_on: false, ..Pace::default() };
             run.pace.from_unknown = k < self.approach;
+            match run.last.replace(k).filter(|_| !rests).map(|last| self.corner(last, k)) {
+                Some(Corners::Within(by)) => run.rounded = run.rounded.max(by),
+                Some(Corners::Free) => run.rounded_freely = run.rounded_freely.or(Some(step.line)),
+                _ => {}
+            }
             let first = run.path.len() as u32;
             run.spins(first, setting);
             layer.follow(k, step, run).map_err(fault)?;
@@ -131,6 +141,11 @@ struct Run {
     /// How far arcs are off their chords, and turning moves off their pieces, mm.
     chords_stray: f64,
     turns_stray: f64,
+    /// How far corners are rounded, mm, and the line behind the first one for which no bound is known.
+    rounded: f64,
+    rounded_freely: Option<u32>,
+    /// The last step.
+    last: Option<usize>,
     /// Time for which the machine dwells, s.
     standing_s: f64,
     /// Of the next place.
@@ -152,6 +167,9 @@ impl Run {
             cutting: false,
             chords_stray: 0.0,
             turns_stray: 0.0,
+            rounded: 0.0,
+            rounded_freely: None,
+            last: None,
             standing_s: 0.0,
             pace: Pace::default(),
         }
@@ -193,12 +211,13 @@ impl Run {
     }
 
     fn finished(self, program: &str) -> ToolRun {
-        let strays = self.chords_stray + self.turns_stray;
+        let strays = self.chords_stray + self.turns_stray + self.rounded;
         let leans = self.turns_stray / WEIGHED_OVER;
         let (tools, program) = (vec![(0, self.tool)], program.to_owned());
         let origin =
             Origin { tools, program, strays, leans, standing_s: self.standing_s, ..self.path.origin };
-        ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
+        let Self { tool, joints, rounded, rounded_freely, .. } = self;
+        ToolRun { tool, path: Toolpath { origin, ..self.path }, joints, rounded, rounded_freely }
     }
 
     /// A piece of a step in which axes turn; it takes so many minutes, where that is known.

@@ -3,7 +3,8 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::control::{FeedMode, Length, Motion, Plane, Variables};
+use crate::control::{Control, FeedMode, Length, Motion, Plane, Variables};
+use crate::corners::Corners;
 use crate::expression::System;
 use crate::frame::{Frame, Place, WORK_OFFSETS};
 use crate::program::{Spindle, Unset};
@@ -88,6 +89,9 @@ pub(crate) struct Modal {
     pub tip_kept: bool,
     /// The machine comes to rest behind every block.
     pub exact_stop: bool,
+    pub corners: Corners,
+    /// E of G187, mm.
+    pub smoothness: Option<f64>,
 }
 
 /// What stays from one cycle to the next, in units of the program's coordinates (mm).
@@ -135,7 +139,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    pub fn new(setup: &Setup) -> Self {
+    pub fn new(setup: &Setup, control: &Control) -> Self {
         let mut frame = Frame::new(setup.work);
         let more = frame.work[0];
         frame.work.extend(std::iter::repeat_n(more, MORE_OFFSETS));
@@ -153,6 +157,8 @@ impl State {
             length: Length::Off,
             tip_kept: false,
             exact_stop: false,
+            corners: if control.rounds_at_start { Corners::Free } else { Corners::Unsaid },
+            smoothness: None,
         };
         Self {
             modal,

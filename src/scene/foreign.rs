@@ -83,6 +83,9 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
         (Some(tool), runs.into_iter().filter(|run| run.tool == tool).collect(), others)
     };
+    let rounded = runs.iter().map(|run| run.rounded).fold(0.0, f64::max);
+    let freely = runs.iter().filter_map(|run| run.rounded_freely).min();
+    notes.extend(freely.and_then(|line| rounded_freely(&read.name, line, control, kinematics.is_some())));
     let (path, joints) = joined(runs.into_iter());
     let tools = if only.is_none() { tools_of(&path, &described) } else { None };
     match only {
@@ -105,6 +108,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         joints,
         table_zero,
         straight_rapids: control.straight_rapids.filter(|_| !is_apt),
+        rounded,
         tools,
         gauge_lengths: lengths.clone(),
         before: others.before,
@@ -312,6 +316,15 @@ fn tools_of(path: &Toolpath, table: &ToolTable) -> Option<(Cutters, Vec<Option<H
     Some((cutters, holders))
 }
 
+/// That corners are rounded and nothing says by how much, the first before a line.
+fn rounded_freely(name: &str, line: u32, control: &Control, turns: bool) -> Option<String> {
+    let bounded_by = control.corners_bounded_by?;
+    let where_it_turns = if turns { " (where rotary axes turn, G61 alone)" } else { "" };
+    Some(format!(
+        "{name}: the control may round corners, first where line {line} begins, and nothing bounds by how much: what that          leaves or cuts is not measured. {bounded_by} would bound it{where_it_turns}"
+    ))
+}
+
 fn nothing(read: &Program) -> (String, String) {
     (
         format!("the program {} moves nothing", read.name),
@@ -380,7 +393,7 @@ fn feeds(runs: &[ToolRun], tool: u32) -> bool {
 
 /// Runs as one path, and the joints of each. How the machine comes from one to the next is not known.
 fn joined(mut runs: impl Iterator<Item = ToolRun>) -> (Toolpath, Vec<(u32, Vec<Waypoint>)>) {
-    let Some(ToolRun { tool, path, joints }) = runs.next() else {
+    let Some(ToolRun { tool, path, joints, .. }) = runs.next() else {
         let nowhere = motion::ClPoint::upright(geometry::Point3::origin());
         return (Toolpath::new(nowhere, Vec::new()), Vec::new());
     };

@@ -793,3 +793,20 @@ fn feeds_beyond_the_rapid_rate_are_refused() {
     }
     assert!(of("feed_rate = 15000", "").is_ok());
 }
+
+#[test]
+fn passes_at_an_angle_ride_on_the_offset_along_the_normals_alone() {
+    let with = |keys: &str| {
+        format!(
+            "[part]\nfile = \"a.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 4\n[[toolpath]]\nstrategy = \"offset-surface\"\n{keys}\n"
+        )
+    };
+    for offset in ["published", "in-plane"] {
+        let (message, cure, at) = refused(&with(&format!("angle = 0\noffset = \"{offset}\"")));
+        assert!(message.starts_with("passes at an angle ride on"), "{message}");
+        assert!(cure.contains("`offset`") && at == (9, 1), "{cure} {at:?}");
+    }
+    for keys in ["angle = 0", "angle = 0\noffset = \"normal\"", "along = \"u\"\noffset = \"published\""] {
+        Scene::parse("folder/wave.toml", with(keys)).unwrap();
+    }
+}

@@ -252,6 +252,46 @@ fn faults_are_named_with_their_lines() {
     );
 }
 
+/// Corners rounded by up to P are off the program by as much, and by as much again where places within Q of a
+/// line are left out.
+#[test]
+fn corners_that_a_control_may_round_widen_all_bounds() {
+    let linuxcnc = |codes: &str| {
+        let mut program = raster();
+        program.insert(3, codes.to_owned());
+        let (answer, report) = verify(&program, &["--control", "linuxcnc", "--allowance", "1"]);
+        (answer.code, report.unwrap()["toolpaths"][0].clone())
+    };
+    let bound = |of: &Value| of["gouge"]["error_bound_mm"].as_f64().unwrap();
+    let noted = |of: &Value| of["notes"].to_string().contains("nothing bounds by how much");
+    let (exact, along_the_lines) = linuxcnc("G61");
+    assert!(exact == Some(0) && !noted(&along_the_lines), "{along_the_lines}");
+    let (small, near) = linuxcnc("G64 P0.001");
+    assert!(small == Some(0) && !noted(&near), "{near}");
+    assert!((bound(&near) - bound(&along_the_lines) - 0.002).abs() < 1e-9, "{near}");
+    let (large, far) = linuxcnc("G64 P1");
+    assert_eq!(large, Some(1), "{far}");
+    assert!(far["violations"].as_array().unwrap().is_empty(), "{far}");
+    let open = far["undecided"].as_array().unwrap();
+    assert!(open.iter().any(|claim| claim["what"] == "gouge"), "{far}");
+    assert!(open.iter().all(|claim| claim["text"].to_string().contains("G64 P")), "{far}");
+    // No limit is known of either.
+    for codes in ["G64", "G21"] {
+        let (free, of_default) = linuxcnc(codes);
+        assert!(free == Some(0) && noted(&of_default), "{codes}: {of_default}");
+    }
+}
+
+#[test]
+fn a_program_that_never_feeds_is_told_so_under_a_table_of_tools() {
+    let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n[[tool]]\nnumber = 2\nshape = \"flat\"\ndiameter = 4\n";
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("tools.toml"), tools).unwrap();
+    let program = ["G21 G90", "T1 M6", "G0 X1 Y1 Z9", "M30"].map(str::to_owned);
+    let (answer, _) = verify_in(home.path(), &program, &["--tools", "tools.toml"]);
+    assert!(answer.code == Some(2) && answer.stderr.contains("no tool moves at feed"), "{}", answer.stderr);
+}
+
 /// The tool has one length, and no table says which: with 20 mm the way down behind G49 ends 5 mm deep in the
 /// plate. A rapid there is placed by the length under which the tool feeds.
 #[test]

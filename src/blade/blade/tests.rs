@@ -103,6 +103,10 @@ fn a_passage_has_the_sides_that_face_each_other() {
         assert!(normals[0].y * sense > 0.5 && normals[1].y * sense < -0.5, "{normals:?}");
         assert!((blade.surfaces[1].point(0.5, 0.5).y - pitch.y).abs() < 5.0);
     }
+    // Blades of 4 to 3 mm, bent by 1.5, that stand 2 mm apart.
+    let near = BladeSettings { pitch: Some(Vector3::new(0.0, 2.0, 0.0)), ..settings(BladeSide::Passage) };
+    let refused = Blade::new(&twisted(), &near).unwrap_err();
+    assert!(matches!(refused, BladeError::Neighbours { .. }) && refused.cure().is_some(), "{refused}");
     let alone = Blade::new(&twisted(), &settings(BladeSide::Passage)).unwrap_err();
     assert_eq!(alone, BladeError::NoSecondBlade);
 }

@@ -101,6 +101,14 @@ pub enum FairingError {
     /// Neighbours of the published method.
     #[error("a corrected place needs a neighbour on each side; 1 is Kjellander's")]
     NoNeighbours,
+    /// No point of the curve has as many neighbours.
+    #[error("with {neighbours} neighbours on each side a corrected place needs {} points, and the curve has {points}", 2 * neighbours + 1)]
+    TooFewPoints {
+        /// Neighbours on each side.
+        neighbours: usize,
+        /// Points of the curve.
+        points: usize,
+    },
     /// Moved points let no spline through.
     #[error("fairing brought points together ({0}); allow less displacement, or delete close points")]
     Moved(SplineError),

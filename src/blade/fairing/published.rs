@@ -49,8 +49,13 @@ fn way(spline: &CubicSpline, k: usize, neighbours: usize) -> Option<Vector2> {
     Some(place - spline.points()[k].coords)
 }
 
-/// Fairs a curve; `cap` is how far any point may end from its first place, mm.
+/// Fairs a curve; `cap` is how far any point may end from its first place, mm. A curve whose points have no
+/// neighbours on both sides at all is straight, or a cubic, and stays.
 pub(super) fn fair(spline: &CubicSpline, neighbours: usize, cap: f64) -> Result<Faired, FairingError> {
+    let points = spline.points().len();
+    if neighbours > 1 && points <= 2 * neighbours {
+        return Err(FairingError::TooFewPoints { neighbours, points });
+    }
     let mut faired = Faired::unmoved(spline);
     let mut displacements = vec![Vector2::zeros(); spline.points().len()];
     let mut before = f64::INFINITY;
@@ -131,5 +136,9 @@ mod tests {
                 assert!(faired.jump_energy[1] < 0.8 * faired.jump_energy[0]);
             }
         }
+        // Forty points have nobody with twenty on each side.
+        assert!(fair(&rough, 19, 0.02).unwrap().furthest() > 0.0);
+        let short = FairingError::TooFewPoints { neighbours: 20, points: 40 };
+        assert_eq!(fair(&rough, 20, 0.02).unwrap_err(), short);
     }
 }

@@ -28,7 +28,7 @@ const BLUNT: f64 = 0.1;
 const AVERAGED: f64 = 0.005;
 
 /// Looks at a span of the spline.
-const LOOKS: usize = 8;
+pub(super) const LOOKS: usize = 8;
 
 /// An edge nearer to a point of the table than this share of the span is that point.
 const SNAP: f64 = 0.05;
@@ -150,11 +150,12 @@ impl Sections {
     /// The edges of closed outlines, section by section; nothing for sections of two sides, whose edges are
     /// their ends.
     ///
-    /// Each section's leading edge is the one on the side of that of the section before. Which end of the
-    /// blade it is, is what was stated ([`with_leading`](Self::with_leading)), else the blunter one by the
-    /// mean of all sections, else (within 5 %) that of the lesser x of the lowest section. The pressure side
-    /// is the one that the camber, the mean of all sections, bends away from; of symmetric sections the one
-    /// on the right of the chord.
+    /// Each section's leading edge is the one on the side of that of the section before. A round section has
+    /// its edges in the directions of its neighbour's chord; where all are round, of the lowest one's first
+    /// point. Which end of the blade it is, is what was stated ([`with_leading`](Self::with_leading)), else
+    /// the blunter one by the mean of all sections, else (within 5 %) that of the lesser x of the lowest
+    /// section. The pressure side is the one that the camber, the mean of all sections, bends away from; of
+    /// symmetric sections the one on the right of the chord.
     ///
     /// # Errors
     /// [`SectionError::Spline`] where no spline can be laid through an outline.
@@ -163,13 +164,9 @@ impl Sections {
         for (k, section) in self.sections.iter().enumerate() {
             let Outline::Closed(points) = &section.outline else { continue };
             let place = SectionPlace { section: k, height: section.height, point: None };
-            let mut edges = both_ends(points).map_err(|source| SectionError::Spline { place, source })?;
-            let chord = |e: &OutlineEdges| e.trailing.point - e.leading.point;
-            if found.last().is_some_and(|before| chord(before).dot(&chord(&edges)) < 0.0) {
-                edges.exchange();
-            }
-            found.push(edges);
+            found.push(both_ends(points).map_err(|source| SectionError::Spline { place, source })?);
         }
+        follow_each_other(&mut found);
         if !leading_is_right(&found, self.leading) {
             found.iter_mut().for_each(OutlineEdges::exchange);
         }
@@ -212,6 +209,24 @@ fn given_sides(height: f64, outline: &Outline) -> Option<SectionSides> {
         around,
         around_closed: false,
     })
+}
+
+/// Puts leading edges on the same side, from the lowest section that has edges of its own up and down; round
+/// ones take the chord of their neighbour.
+fn follow_each_other(found: &mut [OutlineEdges]) {
+    let round: Vec<bool> = found.iter().map(OutlineEdges::is_round).collect();
+    let first = round.iter().position(|round| !round).unwrap_or(0);
+    let chord = |edges: &OutlineEdges| edges.trailing.point - edges.leading.point;
+    let mut follow = |k: usize, neighbour: usize| {
+        let beside = chord(&found[neighbour]);
+        if round[k] {
+            found[k].put_along(&beside);
+        } else if beside.dot(&chord(&found[k])) < 0.0 {
+            found[k].exchange();
+        }
+    };
+    (first + 1..round.len()).for_each(|k| follow(k, k - 1));
+    (0..first).rev().for_each(|k| follow(k, k + 1));
 }
 
 /// Whether the edges that are taken for leading are.
@@ -309,7 +324,7 @@ fn corners(spline: &CubicSpline, about: f64, reach: f64) -> Vec<usize> {
 }
 
 /// A parameter, or that of a point of the outline next to it.
-fn snapped(spline: &CubicSpline, t: f64) -> f64 {
+pub(super) fn snapped(spline: &CubicSpline, t: f64) -> f64 {
     let knots = spline.parameters();
     let k = knots.partition_point(|knot| *knot <= t).clamp(1, knots.len() - 1);
     let near = SNAP * (knots[k] - knots[k - 1]);

@@ -10,6 +10,7 @@ mod check;
 mod edges;
 mod error;
 mod naca;
+mod round;
 mod rounding;
 mod stations;
 #[cfg(test)]

@@ -37,7 +37,7 @@ pub struct NacaDigits {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     /// Not four digits.
-    #[error("\"{0}\" is no NACA number of four digits; write one such as \"2412\"")]
+    #[error("\"{0}\" is no NACA number of four digits")]
     Digits(String),
     /// Camber without a place.
     #[error(

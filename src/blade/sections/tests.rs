@@ -528,3 +528,26 @@ fn blades_that_cannot_be_generated_say_why() {
     assert!(radius.contains("may be 80 % of half of that at most"), "{radius}");
     assert!(refusal(&|b| b.trailing_edge = TrailingEdge::Rounded { radius: -1.0 }).contains("radius -1"));
 }
+
+/// Circles whose points begin anywhere have their edges one above the other, below an ellipse those of its
+/// chord.
+#[test]
+fn round_sections_have_edges_where_their_neighbours_have_them() {
+    let turned = |points: Vec<Point2>, angle: f64| -> Vec<Point2> {
+        points.iter().map(|p| nalgebra::Rotation2::new(angle) * p).collect()
+    };
+    let circle = |height: f64, start: f64| closed(height, turned(ellipse(6.0, 6.0, 60), start));
+    let angles = |sections: Vec<Section>| -> Vec<f64> {
+        let found = Sections::new(sections).unwrap().edges().unwrap();
+        found.iter().map(|e| e.trailing.point - e.leading.point).map(|c| c.y.atan2(c.x)).collect()
+    };
+    // Snapping moves an edge by a twentieth of the step between two points.
+    let near = 0.1 * std::f64::consts::TAU / 60.0;
+    let all = angles(vec![circle(0.0, 0.3), circle(2.0, 2.0), circle(4.0, -2.3), circle(5.0, 1.0)]);
+    assert!(all.iter().all(|angle| (angle - all[0]).abs() < near), "{all:?}");
+    let lens = |height: f64, angle: f64| closed(height, turned(ellipse(8.0, 3.0, 60), angle));
+    let mixed =
+        angles(vec![circle(0.0, 1.9), circle(2.0, -1.0), lens(4.0, 0.5), lens(6.0, 0.7), circle(8.0, 3.0)]);
+    let expected = [0.5, 0.5, 0.5, 0.7, 0.7];
+    assert!(mixed.iter().zip(expected).all(|(a, b)| (a - b).abs() < near), "{mixed:?}");
+}

@@ -215,6 +215,19 @@ fn faults_of_blades_name_line_column_and_cure() {
     at("chord = 40\n", "", "blade.toml:5:1: [[station]] number 1 has no `chord`; add `chord = 40.0`");
     at("chord = 40", "chord = -40", "blade.toml:8:9: `chord` in [[station]] number 1 is -40");
     at("height = 60", "height = 0", "blade.toml:12:1: the station at height 0 is no higher");
+    at(
+        "sections = 5",
+        "stacking = 1.5",
+        "blade.toml:1:12: `stacking` in the blade is 1.5; expected a number (0 to 1, a share of the chord)",
+    );
+    at(
+        "sections = 5",
+        "sections = 5.5",
+        "blade.toml:1:12: `sections` in the blade is 5.5; expected a whole number",
+    );
+    // The cure is said once.
+    let five = blade(&BLADE.replacen("\"6412\"", "\"23012\"", 1)).unwrap_err();
+    assert!(five.contains("no NACA number") && five.matches("2412").count() == 1, "{five}");
     at("0.09", "0.9", "blade.toml:16:13: `thickness` in [[station]] number 2 is 0.9");
     at("[1, 2.5]", "[1]", "blade.toml:17:8: `lean` in [[station]] number 2: expected a list of two numbers");
     at("{ radius = 0.3 }", "\"sharp\"", "blade.toml:3:17: `trailing_edge` in the blade cannot be \"sharp\"");

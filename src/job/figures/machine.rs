@@ -220,6 +220,7 @@ mod tests {
 
     fn program(joints: Vec<(u32, Vec<Waypoint>)>) -> ReadProgram {
         ReadProgram {
+            rounded: 0.0,
             straight_rapids: None,
             path: Toolpath::new(ClPoint::upright(Point3::origin()), Vec::new()),
             joints,

@@ -363,8 +363,8 @@ impl Along<'_> {
         let beyond = if is_deeper { self.engine.beyond_depth() } else { 0.0 };
         gouge.error_bound_mm =
             left.depth + (greatest.possible_depth - greatest.depth).max(0.0) + beyond + NUMERICAL_FLOOR;
-        if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
-            (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
+        if let Some((at, by)) = greatest.deepest.filter(|_| greatest.depth > limits.gouge) {
+            gouge.deepest_at(greatest.depth, at.into(), by);
         }
         let standing = Standing { hollow, greatest: &greatest, left: left.uncut };
         let mut uncut = inspection.uncut(&net, &samples, &shares, kept, &standing);

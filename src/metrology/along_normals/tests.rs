@@ -158,6 +158,21 @@ fn a_gouge_is_found_with_its_depth_area_and_move() {
     assert!((gouge.area_mm2 / (4.0 * width) - 1.0).abs() < 0.1, "{gouge:?}");
 }
 
+/// A ball dips a little deeper than the limit, in the middle between places that are four times as far apart as
+/// the dip is wide.
+#[test]
+fn a_gouge_between_the_places_has_a_place_and_a_move_as_well() {
+    let dip = [1.0, -0.0055, 1.0].map(|z| Point3::new(2.2, 1.3, z));
+    let (measured, map) = measured(&plane([4.0, 3.0]), &path(&[dip.to_vec()]), 0.8);
+    let gouge = &measured.gouge;
+    assert!((gouge.max_depth_mm - 0.0055).abs() <= gouge.error_bound_mm, "{gouge:?}");
+    assert!(map.deviations.iter().all(|x| x.is_nan() || *x > -5e-3), "the net is to miss it");
+    let [region] = &gouge.regions[..] else { panic!("{gouge:?}") };
+    assert!((Point3::from(region.at_mm) - dip[1]).norm() < 0.06, "{region:?}");
+    assert_eq!((gouge.region_count, region.depth_mm, region.area_mm2), (1, gouge.max_depth_mm, 0.0));
+    assert!([1, 2].contains(&region.move_index), "{region:?}");
+}
+
 /// Passes along x with tips at these places across, in turns.
 fn along_x(tips: &[[f64; 2]]) -> Vec<Vec<Point3>> {
     let pass = |(k, [y, z]): (usize, &[f64; 2])| {

@@ -259,6 +259,7 @@ impl Interpreter<'_> {
             unset: *unset,
             tip_kept: modal.tip_kept || modal.length == Length::Tcp,
             work: frame.active as u32 + 1,
+            corners: modal.corners,
         }
     }
 }

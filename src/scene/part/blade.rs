@@ -110,6 +110,13 @@ impl Source for BladeRequest {
         }
         let fairing = part.inline("fairing").map(|table| read_fairing(&table)).transpose()?;
         if fairing.is_none() && part.has("fairing") {
+            if let Some(word) = part.text("fairing")?
+                && METHODS.iter().any(|(method, _)| *method == word.value)
+            {
+                let cure = format!("write `fairing = {{ method = \"{}\", tolerance = 0.05 }}`", word.value);
+                let message = format!("`fairing` = \"{}\" does not say how far a point may move", word.value);
+                return Err(part.error(&word.span, message, cure));
+            }
             part.word("fairing", &["none"])?;
         }
         let pitch = pitch.map(|v| Vector3::from(v.value));
@@ -161,7 +168,10 @@ impl Source for BladeRequest {
             ),
             fairing: self.fairing,
         };
-        let blade = Blade::new(&sections, &settings).map_err(|e| job.refused(file, e))?;
+        let blade = Blade::new(&sections, &settings).map_err(|e| match e.cure() {
+            Some(cure) => job.source.error(file.span.clone(), e.to_string(), cure),
+            None => job.refused(file, e),
+        })?;
         let patches: Vec<Patch> = blade.surfaces.iter().cloned().map(Patch::Nurbs).collect();
         let tolerance = default_tessellation_tolerance(&patches);
         let part = Part::from_oriented_patches(patches, tolerance).map_err(|e| job.refused(file, e))?;
@@ -190,6 +200,12 @@ mod tests {
             refused.to_string().contains("`neighbours` says nothing to the method \"energy\""),
             "{refused}"
         );
-        assert!(scene("{ method = \"published\", tolerance = 0.02, neighbours = 0 }").is_err());
+        for neighbours in ["0", "20.5"] {
+            let key = format!("{{ method = \"published\", tolerance = 0.02, neighbours = {neighbours} }}");
+            let refused = scene(&key).unwrap_err().to_string();
+            assert!(refused.contains("expected a whole number (1 to 20)"), "{refused}");
+        }
+        let bare = scene("\"kjellander\"").unwrap_err();
+        assert!(bare.to_string().contains("how far a point may move"), "{bare}");
     }
 }

@@ -47,8 +47,9 @@ const MOST_STRAY: f64 = 1.0;
 pub fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.guide())? {
-        all.append(on_chart(task, &chart)?);
+    let charts = Chart::all(part, cutter, settings.guide())?;
+    for (k, chart) in charts.iter().enumerate() {
+        all.append_patch([k, charts.len()], on_chart(task, chart)?);
     }
     Ok(all)
 }

@@ -84,8 +84,9 @@ fn passes_along(task: &Task<'_>, along: Along, placing: LevelSteps) -> Result<Pa
         Along::V => Axis::U,
     });
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.guide())? {
-        all.append(along_levels(task, &chart, &field, placing, Lines::Levels)?);
+    let charts = Chart::all(part, cutter, settings.guide())?;
+    for (k, chart) in charts.iter().enumerate() {
+        all.append_patch([k, charts.len()], along_levels(task, chart, &field, placing, Lines::Levels)?);
     }
     Ok(all)
 }

@@ -158,10 +158,11 @@ impl Strategy for IsoScallop {
         }
         let charts = Chart::all(task.part, task.cutter, task.settings.guide())?;
         for (k, chart) in charts.iter().enumerate() {
-            all.append(match task.earlier_on_chart(k, charts.len()) {
+            let passes = match task.earlier_on_chart(k, charts.len()) {
                 Some(levelled) => along_levelled(task, chart, levelled)?,
                 None => on_chart(task, chart, self.start)?,
-            });
+            };
+            all.append_patch([k, charts.len()], passes);
         }
         Ok(all)
     }

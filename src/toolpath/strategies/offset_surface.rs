@@ -114,6 +114,13 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
                 "delete `angle` on patches and blades, `along` on meshes",
             ));
         }
+        Some(_) if drive != OffsetDrive::Exact => {
+            return Err(section.key_error(
+                "offset",
+                "passes at an angle ride on the offset along the normals, and on no other",
+                "delete `offset`, or write `along = \"u\"` instead of `angle`",
+            ));
+        }
         Some(angle) => OffsetAlong::Angle(angle.value.to_radians()),
         None => along,
     };
@@ -175,15 +182,16 @@ fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Pa
         }
     };
     let mut all = Passes::default();
-    for chart in &charts {
+    for (k, chart) in charts.iter().enumerate() {
         let exact = matches!(drive, OffsetDrive::Exact);
         let drop = (exact && settings.axis.is_none()).then(|| DropCutter::watched(part, cutter, monitor));
         let drop = drop.transpose()?;
         let rider = PatchRider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
-        all.append(match along {
+        let passes = match along {
             OffsetAlong::Spiral => rider.spiral()?,
             _ => rider.lines()?,
-        });
+        };
+        all.append_patch([k, charts.len()], passes);
     }
     Ok(all)
 }

@@ -57,6 +57,8 @@ pub struct ReadProgram {
     pub table_zero: [f64; 2],
     /// Under which setting of the control rapid moves run straight, in a clause; `None` where they always do.
     pub straight_rapids: Option<&'static str>,
+    /// How far the program lets the control round corners, mm, which the path's strays have as well.
+    pub rounded: f64,
     /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all
     /// moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,

@@ -264,7 +264,7 @@ fn passes(
             });
             planned.obedience = obedience::on_chart(task, chart, &mut planned.contacts, [direction, spread]);
         }
-        all.append(planned);
+        all.append_patch([k, charts.len()], planned);
     }
     Ok(all)
 }

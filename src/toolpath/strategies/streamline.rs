@@ -306,8 +306,9 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let of = charts.len();
     for (k, (chart, calculated)) in charts.into_iter().zip(by_calculation).enumerate() {
         if matches!(direction, FeedDirection::WidestStrip) && all_strips_are_alike(&chart, cutter) {
-            all.notes.push(ALIKE.to_owned());
-            all.append(shortest::on_chart(task, &chart, [k, of], None, Objective::Time)?);
+            let mut passes = shortest::on_chart(task, &chart, [k, of], None, Objective::Time)?;
+            passes.notes.insert(0, ALIKE.to_owned());
+            all.append_patch([k, of], passes);
             continue;
         }
         let spread = feed::on_chart(direction, &chart, cutter)?;
@@ -326,8 +327,8 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
             wanted.side,
         );
         notes.extend(planned_field::singular_note(&passes.field));
-        all.notes.extend(notes);
-        all.append(passes);
+        passes.notes.splice(0..0, notes);
+        all.append_patch([k, of], passes);
     }
     Ok(all)
 }

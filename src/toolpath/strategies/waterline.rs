@@ -76,16 +76,18 @@ impl Strategy for Waterline {
             return mesh_contours::passes(task, self.steps);
         }
         let mut all = Passes::default();
-        for chart in Chart::all(part, cutter, settings.guide())? {
-            let field = ScalarField::Grid(heights(&chart, cutter)?);
-            let level = level_share(&chart, cutter, &field, settings);
-            all.append(along_levels(task, &chart, &field, self.steps, Lines::Levels)?);
+        let charts = Chart::all(part, cutter, settings.guide())?;
+        for (k, chart) in charts.iter().enumerate() {
+            let field = ScalarField::Grid(heights(chart, cutter)?);
+            let level = level_share(chart, cutter, &field, settings);
+            let mut passes = along_levels(task, chart, &field, self.steps, Lines::Levels)?;
             if level >= LEAST_TOLD {
-                all.notes.push(format!(
+                passes.notes.push(format!(
                     "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",
                     100.0 * level
                 ));
             }
+            all.append_patch([k, charts.len()], passes);
         }
         Ok(all)
     }

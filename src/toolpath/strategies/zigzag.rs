@@ -193,10 +193,11 @@ fn on_levels(task: &Task<'_>, angle: f64, steps: LevelSteps) -> Result<Passes, P
     let Task { part, cutter, ref settings, .. } = *task;
     let across = Vector2::new(-angle.sin(), angle.cos());
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.guide())? {
+    let charts = Chart::all(part, cutter, settings.guide())?;
+    for (k, chart) in charts.iter().enumerate() {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
-        all.append(along_levels(task, &chart, &field, steps, Lines::Levels)?);
+        all.append_patch([k, charts.len()], along_levels(task, chart, &field, steps, Lines::Levels)?);
     }
     Ok(all)
 }

@@ -130,6 +130,14 @@ impl Passes {
         self.passes.iter().flat_map(|pass| pass.windows(2)).map(|w| (w[1] - w[0]).norm()).sum()
     }
 
+    /// Appends the passes and remarks of patch `k`, from 0, of so many; remarks say which.
+    pub fn append_patch(&mut self, [k, of]: [usize; 2], mut other: Self) {
+        if of > 1 {
+            other.notes.iter_mut().for_each(|note| *note = format!("on patch {} of {of}: {note}", k + 1));
+        }
+        self.append(other);
+    }
+
     /// Appends the passes and remarks of another piece of the part.
     pub fn append(&mut self, other: Self) {
         self.passes.extend(other.passes);
