@@ -23,9 +23,9 @@ const HALVINGS: usize = 16;
 /// is lost.
 const SHARP: f64 = 0.26;
 
-/// Two faces whose unit normals sum up to less, some eleven degrees between them, have no ridge: they are the
-/// sides of a thin part.
-const LEAST_RIDGE: f64 = 0.2;
+/// Two faces whose unit normals sum up to less, one degree between them, have no ridge: they are the sides of a
+/// thin part.
+const LEAST_RIDGE: f64 = 0.02;
 
 /// A part that is thinner than a cut is deep.
 #[derive(Debug, Clone, Copy, PartialEq)]

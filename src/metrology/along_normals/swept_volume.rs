@@ -334,7 +334,9 @@ impl AlongNormal for SweptVolume<'_> {
         }
         match ridge {
             Some(normals) => {
-                let own = if is_near { Some(found) } else { look(self.inward) };
+                // What ends within half the thickness is no matter of the far side.
+                let within = || look(thin.radius).filter(|hit| hit.deviation > -thin.radius);
+                let own = if is_near { Some(found) } else { within().or_else(|| look(self.inward)) };
                 let looked = [2.0 * thin.radius, own.map_or(depth, |own| -own.deviation)];
                 let cut = self.on_ridge(point, normals, looked, found);
                 let corner = corner_at(self.part, point, &normals, normal, -cut.deviation);

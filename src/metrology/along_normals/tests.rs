@@ -384,6 +384,50 @@ fn what_stands_beside_a_sharp_edge_is_as_high_as_elsewhere() {
     }
 }
 
+/// Knives of ten and of four degrees, one face of which is cut too deep: the crest is lower by what is lost over
+/// the sine of half the angle.
+#[test]
+fn a_cut_beside_the_crest_of_a_knife_is_as_deep_as_the_crest_is_lower() {
+    for half in [5f64, 2.0] {
+        let (slope, deep) = (half.to_radians().tan(), 2e-3);
+        let corners = [[0.0, 0.0], [1.0, slope], [1.0, -slope]];
+        let corners = corners.iter().flat_map(|&[y, z]| [0.0, 1.0].map(|x| Point3::new(x, y, z))).collect();
+        let triangles = vec![[0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1]];
+        let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+        let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+        let solid = Solid::of_cutter(&ball, None);
+        for lost in [1.0, -1.0] {
+            let mut moves = Vec::new();
+            for (pass, up) in (0..24).flat_map(|k| [1.0, -1.0].map(|up| (k, up))) {
+                let normal = Vector3::new(0.0, -slope, up).normalize();
+                let y = 0.1 * f64::from(pass) - 0.5;
+                let axis = (Vector3::z() * up - Vector3::y()).normalize();
+                for (x, kind) in [(-4.0, MoveKind::Rapid), (8.0, MoveKind::Cut)] {
+                    let off = normal * (RADIUS - if up == lost { deep } else { 0.0 });
+                    let tip = Point3::new(x, y, up * slope * y) + off - axis * RADIUS;
+                    moves.push(Move { to: ClPoint { tip, axis }, kind, feed_rate: 1000.0, pass });
+                }
+            }
+            let path = Toolpath::new(moves[0].to, moves);
+            let rays = Rays::new(&path, &solid, &Silent).unwrap();
+            let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+            let cut = swept(&part, &by_rays, 1.0);
+            let (found, _) =
+                measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-3, None, &Silent).unwrap();
+            // How far the crest is cut off, by all balls.
+            let is_cut = |y: f64| {
+                let passes = path.moves.iter().map(|step| step.to.tip + step.to.axis * RADIUS);
+                passes.map(|centre| (centre.y - y).hypot(centre.z)).any(|distance| distance < RADIUS)
+            };
+            let truth = (1..).map(|k| 1e-5 * f64::from(k)).find(|y| !is_cut(*y)).unwrap();
+            let gouge = found.gouge;
+            let off = (gouge.max_depth_mm - truth).abs();
+            assert!(off < 1e-5 + gouge.error_bound_mm, "{half} {lost}: {truth} {gouge:?}");
+            assert!(truth > 0.7 * deep / half.to_radians().sin() && gouge.error_bound_mm < 1e-3, "{gouge:?}");
+        }
+    }
+}
+
 /// A ball that dips into the corner of a block: lines along the walls, and along the middle of both walls,
 /// graze what it took of the top.
 #[test]
