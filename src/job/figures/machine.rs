@@ -115,8 +115,15 @@ fn travelled(machine: &Kinematics, read: &ReadProgram) -> [Ranges; 2] {
     };
     for (tool, program) in &read.joints {
         let chain = Chain::of(&read.with_tool(machine, *tool));
+        // Where the machine stood before does not count, nor does it while rotary axes alone turn.
+        let (begin, mut is_known) = (program.first().map(|way| way.joints.linear), [false; 3]);
         for (at, way) in program.iter().enumerate().skip(1) {
-            way.joints.linear.iter().enumerate().for_each(|(k, value)| widen(k, *value, 0.0));
+            for (k, value) in way.joints.linear.iter().enumerate() {
+                is_known[k] |= begin.is_some_and(|begin| begin[k] != *value);
+                if is_known[k] {
+                    widen(k, *value, 0.0);
+                }
+            }
             (0..2).for_each(|k| widen(k + 3, way.joints.rotary[k] + read.table_zero[k], 0.0));
             // Where rotary axes turn about a tip that is kept, the linear ones follow.
             if at > 1 && way.way == Way::Tip && way.joints.rotary != program[at - 1].joints.rotary {
@@ -168,7 +175,7 @@ const ROUNDING: f64 = 1e-6;
 fn within_travel(kinematics: &Kinematics, found: &Ranges, most: &Ranges) -> Vec<Claim> {
     let all = kinematics.letters().into_iter().zip(kinematics.limits()).enumerate();
     let beyond = all.filter_map(|(k, (joint, limits))| {
-        let [least, greatest] = limits?;
+        let [least, greatest] = limits.filter(|_| found[k][0] <= found[k][1])?;
         let over = [found, most].map(|ranges| (least - ranges[k][0]).max(ranges[k][1] - greatest));
         Some((k < 3, joint, if k < 3 { over } else { over.map(f64::to_degrees) }))
     });
@@ -264,6 +271,10 @@ mod tests {
         let expected =
             ["joint X runs 26.000 mm beyond its limit", "joint B runs 20.000 degrees beyond its limit"];
         assert_eq!(failed, expected.map(|text| (Verdict::Fail, text.to_owned())));
+        // While rotary joints alone turn, the linear ones stand where they stood before.
+        let turning = through(Way::Axes, &[[999.0, 5.0], [999.0, -5.0], [12.0, 5.0]]);
+        let passed = told(&machine, &program(vec![(1, turning)]));
+        assert!(passed.iter().all(|(verdict, _)| *verdict == Verdict::Pass), "{passed:?}");
         // Without its places nothing is known of the linear joints, and of cutter locations nothing at all.
         let nowhere = told(&head(&limits.replace("workpiece", "# ")), &program(vec![(1, inside)]));
         assert_eq!((nowhere[0].0, nowhere[1].0), (Verdict::Undecided, Verdict::Pass));

@@ -292,9 +292,13 @@ impl SweptVolume<'_> {
         }
     }
 
-    /// The same where the block had no sides. What leans out over a border is part of what stands there.
+    /// The same of what faces up, where the block had no sides: what leans out over a border is part of what
+    /// stands there.
     fn way_up(&self, point: &Point3, normal: &Vector3) -> f64 {
-        if normal.z > 0.0 { ((self.block.max.z - point.z) / normal.z).max(0.0) } else { f64::INFINITY }
+        if normal.z <= 0.0 {
+            return self.way_out(point, normal);
+        }
+        ((self.block.max.z - point.z) / normal.z).max(0.0)
     }
 }
 

@@ -384,6 +384,22 @@ fn what_stands_beside_a_sharp_edge_is_as_high_as_elsewhere() {
     }
 }
 
+/// A wall in the side of the block, and one a millimetre within it, which nothing cuts.
+#[test]
+fn before_a_wall_stands_no_more_than_the_block_holds() {
+    let (part, up) = (plane([4.0, 3.0]), path(&passes(0.0)));
+    let solid = Solid::of_cutter(&Cutter::ball(2.0 * RADIUS).unwrap(), None);
+    let rays = Rays::new(&up, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &up, solid: &solid };
+    let block = Aabb { min: Point3::new(0.0, 0.0, -5.0), max: Point3::new(4.0, 3.0, 2.0) };
+    let cut = SweptVolume { block, ..swept(&part, &by_rays, 2.5) };
+    for (x, left) in [(0.0, 0.0), (1.0, 1.0), (3.0, 2.5)] {
+        let (place, outward) = (Point3::new(x, 1.0, -2.0), -Vector3::x());
+        assert!(cut.hit(&place, &outward, None).is_none());
+        assert_eq!(cut.standing(&place, &outward), left);
+    }
+}
+
 /// Knives of ten and of four degrees, one face of which is cut too deep: the crest is lower by what is lost over
 /// the sine of half the angle.
 #[test]
