@@ -292,13 +292,9 @@ impl SweptVolume<'_> {
         }
     }
 
-    /// The same of what faces up, where the block had no sides: what leans out over a border is part of what
-    /// stands there.
+    /// The same where the block had no sides. What leans out over a border is part of what stands there.
     fn way_up(&self, point: &Point3, normal: &Vector3) -> f64 {
-        if normal.z <= 0.0 {
-            return self.way_out(point, normal);
-        }
-        ((self.block.max.z - point.z) / normal.z).max(0.0)
+        if normal.z > 0.0 { ((self.block.max.z - point.z) / normal.z).max(0.0) } else { f64::INFINITY }
     }
 }
 
@@ -374,7 +370,9 @@ impl AlongNormal for SweptVolume<'_> {
     }
 
     fn standing(&self, point: &Point3, normal: &Vector3) -> f64 {
-        self.outward.min(self.way_up(point, normal))
+        // Nothing leans out over a wall.
+        let way = if normal.z > 0.0 { self.way_up(point, normal) } else { self.way_out(point, normal) };
+        self.outward.min(way)
     }
 
     fn standing_at_most(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
