@@ -32,20 +32,9 @@ impl RimSamples {
         Self { directions: order.map(at).collect() }
     }
 
-    /// Whether convex `shapes`, which all hold the middle between both ends, cover the stadium of this radius
-    /// around `ends`. `covers` tells whether a shape holds all that is within [`RimSamples::MARGIN`] (times
-    /// the radius) of a place. The order of the shapes changes.
-    pub fn covered<T>(
-        &self,
-        ends: [Vector2; 2],
-        radius: f64,
-        shapes: &mut [T],
-        covers: impl Fn(&T, &Vector2) -> bool,
-    ) -> bool {
-        self.first_bare(ends, radius, shapes, covers).is_none()
-    }
-
-    /// As [`RimSamples::covered`]: the first sample of the rim that no shape covers, if there is one.
+    /// The first place of the rim that convex `shapes`, which all hold the middle between both ends, leave bare of
+    /// the stadium of this radius around `ends`; `None` where they cover it. `covers` tells whether a shape holds
+    /// all that is within [`RimSamples::MARGIN`] (times the radius) of a place. The order of the shapes changes.
     pub fn first_bare<T>(
         &self,
         [a, b]: [Vector2; 2],
@@ -89,7 +78,9 @@ mod tests {
         let mut discs: Vec<Vector2> =
             (0..corners).map(|k| Vector2::new(turn(k).cos(), turn(k).sin()) * away).collect();
         let within = 1.0 - RimSamples::MARGIN;
-        RimSamples::new().covered([Vector2::zeros(); 2], 1.0, &mut discs, |c, p| (c - p).norm() <= within)
+        let bare = RimSamples::new()
+            .first_bare([Vector2::zeros(); 2], 1.0, &mut discs, |c, p| (c - p).norm() <= within);
+        bare.is_none()
     }
 
     #[test]
@@ -112,7 +103,8 @@ mod tests {
             let both = around(-half).chain(around(half)).filter(|disc| disc.1 > least);
             let mut discs: Vec<Vector2> = both.map(|(x, y)| Vector2::new(x, y)).collect();
             let ends = [Vector2::new(-half, 0.0), Vector2::new(half, 0.0)];
-            RimSamples::new().covered(ends, 1.0, &mut discs, |c, p| (c - p).norm() <= within)
+            let bare = RimSamples::new().first_bare(ends, 1.0, &mut discs, |c, p| (c - p).norm() <= within);
+            bare.is_none()
         };
         assert!(covered(-1.0, 0.5) && !covered(-0.1, 0.5));
         // Discs that high cross between the ends where x = 0, at 0.3 + sqrt(1 - half²) at least.

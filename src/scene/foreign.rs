@@ -321,7 +321,8 @@ fn rounded_freely(name: &str, line: u32, control: &Control, turns: bool) -> Opti
     let bounded_by = control.corners_bounded_by?;
     let where_it_turns = if turns { " (where rotary axes turn, G61 alone)" } else { "" };
     Some(format!(
-        "{name}: the control may round corners, first where line {line} begins, and nothing bounds by how much: what that          leaves or cuts is not measured. {bounded_by} would bound it{where_it_turns}"
+        "{name}: the control may round corners, first where line {line} begins, and nothing bounds by how much: what that \
+         leaves or cuts is not measured. {bounded_by} would bound it{where_it_turns}"
     ))
 }
 

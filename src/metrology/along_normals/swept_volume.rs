@@ -19,8 +19,8 @@ use sim::{RayHit, Rays, VoxelEngine, Voxels};
 /// program.
 const NEAR: f64 = 0.1;
 
-/// How far above a sharp edge passes of its other face may cut, mm: chords stray less, and what cuts deeper is
-/// found on that face. Nearer to the edge than a few times as much nothing is told by what stands lower.
+/// Right on a sharp edge passes of its other face may cut as well. What stands on a place is looked for from so
+/// far above it, mm: chords stray less, and what cuts deeper is found on that face.
 const GRAZED: [f64; 5] = [0.0, 1e-5, 1e-4, 1e-3, 5e-3];
 
 /// How many times deeper is looked on a ridge that is cut as deep as was looked.
